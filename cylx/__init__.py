@@ -1,0 +1,54 @@
+"""cylx finds every cylinder in a point cloud that has no normals.
+
+The public names are resolved when they are first used, so that `import cylx` and `cylx --help` cost next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+__version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from cylx.api import extract as extract
+    from cylx.config import Config as Config
+    from cylx.config import load_config as load_config
+    from cylx.errors import CylxError as CylxError
+    from cylx.evaluation import compare as compare
+    from cylx.evaluation import evaluate as evaluate
+    from cylx.geometry.cylinder import Cylinder as Cylinder
+    from cylx.io import read_cloud as read_cloud
+    from cylx.io import write_annotated as write_annotated
+    from cylx.records import CylinderFit as CylinderFit
+    from cylx.records import Extraction as Extraction
+    from cylx.records import PointCloud as PointCloud
+    from cylx.results import Result as Result
+
+_HOMES = {
+    "Config": "cylx.config",
+    "Cylinder": "cylx.geometry.cylinder",
+    "CylinderFit": "cylx.records",
+    "CylxError": "cylx.errors",
+    "Extraction": "cylx.records",
+    "PointCloud": "cylx.records",
+    "Result": "cylx.results",
+    "compare": "cylx.evaluation",
+    "evaluate": "cylx.evaluation",
+    "extract": "cylx.api",
+    "load_config": "cylx.config",
+    "read_cloud": "cylx.io",
+    "write_annotated": "cylx.io",
+}
+
+__all__ = ["__version__", *sorted(_HOMES)]
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'cylx' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

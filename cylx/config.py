@@ -1,0 +1,190 @@
+"""The configuration: the YAML file mirrored, one frozen model a stage, every value with its default, unit and sentence.
+
+Precedence: defaults < preset < YAML file < `--set section.key=value` < named option. `null` means "from the cloud" and is
+resolved in one place (`cylx.scene.resolve`); the resolved configuration goes into every result.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+
+def _number(value: Any) -> Any:
+    """Read `1e-3`, which YAML 1.1 takes for a string, as the number it is meant to be."""
+    if isinstance(value, str):
+        try:
+            return float(value)
+        except ValueError:
+            return value
+    return value
+
+
+Number = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0)]
+Share = Annotated[Number, Field(ge=0, le=1)]
+
+
+class Section(BaseModel):
+    """A part of the configuration: unknown keys, wrong types and impossible values are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+
+
+class SceneConfig(Section):
+    """What is known of the cloud before looking at it; `null` is read off the cloud."""
+
+    spacing: Positive | None = None
+    """Distance of neighbouring points on a surface, scene units."""
+    noise: Positive | None = None
+    """Standard deviation of points about their surface, scene units."""
+    radius_min: Positive | None = None
+    """Smallest radius looked for, scene units. Raising it drops thin pipes."""
+    radius_max: Positive | None = None
+    """Largest radius looked for, scene units. Lowering it drops tanks and walls that are hardly curved."""
+
+
+class SlicingConfig(Section):
+    """Planes through the whole cloud, and the points close to them."""
+
+    planes: Annotated[int, Field(ge=0)] = 40
+    """Number of random planes N. More planes find more cylinders and take longer."""
+    thickness: Positive | None = None
+    """Full thickness of a slice, scene units. Thicker slices hold more points and smear the ellipse."""
+    min_points: Annotated[int, Field(ge=6)] = 20
+    """A slice, or a piece of one, with fewer points is dropped."""
+
+
+class EllipsesConfig(Section):
+    """Ellipses in each slice, by RANSAC and the direct least-squares fit."""
+
+    pieces: bool = True
+    """Look in each connected piece of a slice by itself; false looks in the slice as a whole, as the paper does."""
+    iterations: Annotated[int, Field(ge=1)] = 200
+    """RANSAC samples an ellipse. More samples stand more outliers and take longer."""
+    tolerance: Positive | None = None
+    """Distance within which a point supports an ellipse, scene units."""
+    min_inliers: Annotated[int, Field(ge=6)] = 20
+    """An ellipse with fewer supporting points is dropped."""
+    min_share: Share = 0.3
+    """An ellipse with a smaller share of its piece's remaining points is dropped."""
+    max_per_slice: Annotated[int, Field(ge=1)] = 50
+    """Most ellipses taken from one slice."""
+    max_aspect: Annotated[Number, Field(gt=1)] = 4.0
+    """Largest ratio of the semi-axes; slices more oblique than this say little about the axis."""
+
+
+class CandidatesConfig(Section):
+    """Cylinder candidates, from the ellipses of slices and from local curvature."""
+
+    sources: Annotated[list[Literal["slices", "curvature"]], Field(min_length=1)] = ["slices", "curvature"]
+    """Where candidates come from; the paper has slices alone."""
+    polish: bool = True
+    """Fit each candidate to the points about it before the game."""
+    octave: Annotated[Number, Field(gt=1.1, le=4)] = 1.6
+    """Ratio of successive window radii. A smaller ratio looks at more scales and takes longer."""
+    window_spacings: Positive = 2.2
+    """Radius of the smallest curvature window, in spacings."""
+    window_noises: Positive = 5.0
+    """Least radius of the smallest curvature window, in noises."""
+    min_inliers: Annotated[int, Field(ge=6)] = 15
+    """A polished candidate with fewer supporting points is dropped."""
+    min_share: Share = 0.25
+    """A polished candidate that explains a smaller share of its window is dropped."""
+
+
+class ClusteringConfig(Section):
+    """The game that candidates play for their clusters."""
+
+    kernel: Literal["screw", "local"] = "local"
+    """`screw`: eq. 1 and 2 of the paper; `local`: angle, offset at the candidates in radii, and ratio of radii."""
+    screw_scale: Positive = 5.0
+    """Lambda of eq. 2, used by the `screw` kernel; lengths in the median candidate radius. Larger is more tolerant."""
+    angle_deg: Annotated[Number, Field(gt=0, lt=90)] = 4.0
+    """Axis angle at which the `local` kernel has fallen to 1/e, degrees."""
+    offset: Positive = 0.1
+    """Axis offset at which the `local` kernel has fallen to 1/e, in radii."""
+    radius: Positive = 0.06
+    """Relative difference of radii at which the `local` kernel has fallen to 1/e."""
+    min_radius_ratio: Share = 0.75
+    """p of eq. 2: candidates whose radii differ more are incompatible."""
+    diagonal: Annotated[Number, Field(ge=0, le=1)] = 0.0
+    """Payoff of a candidate against itself; 1 in eq. 5, but then every stable state is one single candidate."""
+    dynamics: Literal["replicator", "infection-immunization"] = "infection-immunization"
+    """How the population evolves: eq. 7, or a faster way to the same equilibria."""
+    population: Literal["whole", "local"] = "local"
+    """Who plays: all candidates that are left, or the best connected one and its neighbours."""
+    max_iterations: Annotated[int, Field(ge=1)] = 300
+    """Most steps of the dynamics a cluster."""
+    tolerance: Positive = 1e-4
+    """The dynamics stop when the population changes by less than this a step."""
+    min_support: Annotated[int, Field(ge=1)] = 3
+    """A cluster with fewer candidates is dropped."""
+    min_payoff: Share = 0.3
+    """A cluster with a smaller mean payoff is dropped."""
+
+
+class AveragingConfig(Section):
+    """From the candidates of a cluster to one cylinder."""
+
+    max_iterations: Annotated[int, Field(ge=1)] = 20
+    """Most steps of the dual-quaternion blending."""
+    refine: bool = True
+    """Fit the average to all its points in the cloud, and let it grow along its axis."""
+    merge: bool = True
+    """Join pieces of one pipe where one cylinder explains both."""
+
+
+class VerificationConfig(Section):
+    """Measured properties that tell cylinders from what looks like one; each can be switched off by `null`."""
+
+    enabled: bool = True
+    """Verify at all; the paper does not."""
+    min_inliers: Annotated[int, Field(ge=0)] = 60
+    """Fewest points of an accepted cylinder; half as many suffice for a cluster of payoff 0.5."""
+    min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 25.0
+    """Smallest angle about the axis that must be covered, degrees."""
+    min_height: Annotated[Number, Field(ge=0)] = 0.5
+    """Smallest visible length, in radii."""
+    max_noise_ratio: Positive | None = 1.3
+    """Largest ratio of the residual's standard deviation to the noise; form errors of about 1 % of r come on top."""
+    max_lack_of_fit: Positive | None = 2.5
+    """Largest chi-square per cell of the mean residuals over the surface; 1 is perfect."""
+    max_inside: Number | None = 0.15
+    """Most points inside, as a share of those on the surface, median over ten pieces of the height."""
+    max_outside: Number | None = 0.5
+    """Most points just outside, as a share of those on the surface, median over ten pieces of the height."""
+    max_tangent: Number | None = 0.6
+    """Most points that go on tangentially past both ends of the arc, as a share of the arc's own density."""
+    min_curvature: Number | None = 10.0
+    """Smallest ratio of the curvature to its standard deviation: tells a cylinder from a plane."""
+    max_slope: Number | None = 0.03
+    """Largest change of the radius along the axis: tells a cylinder from a cone."""
+    max_bulge: Number | None = 0.15
+    """Largest curvature along the axis times the radius: tells a cylinder from a sphere, which has 1."""
+
+
+class Config(Section):
+    """All settings of a run."""
+
+    preset: Literal["auto", "paper"] = "auto"
+    """Where the values start from: `auto`, the best we can do, or `paper`, the paper to the letter."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of everything random; the same seed gives the same bytes, on any number of threads."""
+    max_cylinders: Annotated[int, Field(ge=1)] | None = None
+    """Most cylinders extracted; null sets no limit."""
+    scene: SceneConfig = SceneConfig()
+    """What is known of the cloud."""
+    slicing: SlicingConfig = SlicingConfig()
+    """Stage 1: planes and their points."""
+    ellipses: EllipsesConfig = EllipsesConfig()
+    """Stage 2: ellipses in the slices."""
+    candidates: CandidatesConfig = CandidatesConfig()
+    """Stage 3: cylinder candidates."""
+    clustering: ClusteringConfig = ClusteringConfig()
+    """Stage 4: the game."""
+    averaging: AveragingConfig = AveragingConfig()
+    """Stage 5: one cylinder a cluster."""
+    verification: VerificationConfig = VerificationConfig()
+    """What a cylinder must show to be accepted."""

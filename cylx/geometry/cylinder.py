@@ -1,0 +1,150 @@
+"""The cylinder: a point on the axis, a direction, a radius, a height, and the distances to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cylinder:
+    """A finite right circular cylinder, without caps.
+
+    Parameters
+    ----------
+    point : ndarray of shape (3,)
+        Middle of the axis segment, scene units.
+    direction : ndarray of shape (3,)
+        Direction of the axis; normalised, and its largest component made positive.
+    radius : float
+        Scene units, > 0.
+    height : float
+        Length of the axis segment, scene units, >= 0.
+
+    Examples
+    --------
+    >>> can = Cylinder((0, 0, 0.05), (0, 0, -2), radius=0.033, height=0.1)
+    >>> can.direction
+    array([0., 0., 1.])
+    >>> can.start, can.end
+    (array([0., 0., 0.]), array([0. , 0. , 0.1]))
+    """
+
+    point: FloatArray
+    direction: FloatArray
+    radius: float
+    height: float = 0.0
+
+    def __post_init__(self) -> None:
+        point = np.array(self.point, dtype=np.float64)
+        direction = canonical_direction(self.direction)
+        if point.shape != (3,) or direction.shape != (3,):
+            raise ValueError("point and direction must have three components")
+        if not (np.isfinite(point).all() and self.radius > 0 and self.height >= 0 and np.isfinite(self.radius)):
+            raise ValueError("a cylinder needs a finite point, a radius > 0 and a height >= 0")
+        point.setflags(write=False)
+        direction.setflags(write=False)
+        object.__setattr__(self, "point", point)
+        object.__setattr__(self, "direction", direction)
+        object.__setattr__(self, "radius", float(self.radius))
+        object.__setattr__(self, "height", float(self.height))
+
+    @property
+    def start(self) -> FloatArray:
+        """Lower end of the axis segment, shape (3,)."""
+        return self.point - 0.5 * self.height * self.direction
+
+    @property
+    def end(self) -> FloatArray:
+        """Upper end of the axis segment, shape (3,)."""
+        return self.point + 0.5 * self.height * self.direction
+
+    def moved(self, origin: Any, scale: float = 1.0) -> Cylinder:
+        """Give the cylinder in a frame whose unit is `1 / scale` and whose zero lies at `-origin`: x -> scale x + origin."""
+        return Cylinder(
+            scale * self.point + np.asarray(origin), self.direction, scale * self.radius, scale * self.height
+        )
+
+
+def canonical_direction(direction: Any) -> FloatArray:
+    """Return the unit vector along `direction` whose component of largest magnitude is positive.
+
+    Parameters
+    ----------
+    direction : array_like of shape (..., 3)
+
+    Raises
+    ------
+    ValueError
+        If a direction has no finite, positive length.
+    """
+    vectors = np.array(direction, dtype=np.float64)
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if not (np.isfinite(length).all() and (length > 0).all()):
+        raise ValueError("a direction needs a finite length > 0")
+    vectors /= length
+    largest = np.take_along_axis(vectors, np.abs(vectors).argmax(axis=-1)[..., None], axis=-1)
+    return np.asarray(np.where(largest < 0, -vectors, vectors) + 0.0, dtype=np.float64)
+
+
+def cylinder_coordinates(points: FloatArray, point: Any, direction: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Give each point's height along the axis, distance from the axis and angle about it.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+        Scene units.
+    point, direction : array_like of shape (3,)
+        The axis; the direction is of unit length.
+
+    Returns
+    -------
+    heights : ndarray of shape (N,)
+        Along `direction`, zero at `point`.
+    distances : ndarray of shape (N,)
+        From the axis, >= 0.
+    angles : ndarray of shape (N,)
+        About the axis, in (-pi, pi], from an arbitrary but fixed zero.
+    """
+    direction = np.asarray(direction, dtype=np.float64)
+    across, along = axis_frame(direction)
+    offsets = points - np.asarray(point)
+    x, y = offsets @ across, offsets @ along
+    return offsets @ direction, np.hypot(x, y), np.arctan2(y, x)
+
+
+def axis_frame(direction: Any) -> tuple[FloatArray, FloatArray]:
+    """Give two unit vectors that make a right-handed frame with a unit direction.
+
+    Returns
+    -------
+    first, second : ndarray of shape (3,)
+        first x second = direction.
+    """
+    direction = np.asarray(direction, dtype=np.float64)
+    helper = np.zeros(3)
+    helper[np.abs(direction).argmin()] = 1.0
+    first = np.cross(direction, helper)
+    first /= np.linalg.norm(first)
+    return first, np.cross(direction, first)
+
+
+def surface_distances(points: FloatArray, cylinder: Cylinder) -> FloatArray:
+    """Give the signed distance of each point to the infinite cylinder's surface, + is outside.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+    cylinder : Cylinder
+
+    Returns
+    -------
+    ndarray of shape (N,)
+    """
+    _, distances, _ = cylinder_coordinates(points, cylinder.point, cylinder.direction)
+    return distances - cylinder.radius
