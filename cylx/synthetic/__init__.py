@@ -1,0 +1,11 @@
+"""Scenes whose cylinders are known: the oracle of the tests, the samples and the tutorial.
+
+Every scene is determined by its parameters and its seed. Points of even density lie on the surfaces, are moved by
+isotropic Gaussian noise, and come in random order.
+"""
+
+from cylx.synthetic.multi import multi
+from cylx.synthetic.scene import NOISE, OTHER_SURFACE, SyntheticScene, TrueCylinder
+from cylx.synthetic.single import single
+
+__all__ = ["NOISE", "OTHER_SURFACE", "SyntheticScene", "TrueCylinder", "multi", "single"]

@@ -1,0 +1,145 @@
+"""What a synthetic scene is: its points, what each of them is, and the truth about its cylinders."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.errors import UsageError
+from cylx.geometry.cylinder import Cylinder, cylinder_coordinates
+
+FloatArray = NDArray[np.float64]
+
+OTHER_SURFACE = -1
+NOISE = -2
+
+_MIN_POINTS = 100  # a cylinder with fewer points, or less coverage, cannot be asked for
+_MIN_COVERAGE_DEG = 20.0
+_COVERAGE_BINS = 72
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TrueCylinder:
+    """A cylinder of a synthetic scene, and how much of it is in the cloud.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        The shape; its point is at mid-height.
+    points : int
+        Points that lie on it.
+    coverage_deg : float
+        Angle about the axis that these points cover, in steps of 5 degrees.
+    ignore : bool
+        Whether too little of it is in the cloud to ask for it: fewer than 100 points or less than 20 degrees.
+    """
+
+    cylinder: Cylinder
+    points: int
+    coverage_deg: float
+    ignore: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SyntheticScene:
+    """A cloud, what each of its points is, and the cylinders that are in it.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3), float64
+        Scene units.
+    labels : ndarray of shape (N,), int32
+        Index of the cylinder a point lies on, -1 on another surface, -2 for noise and outliers.
+    cylinders : tuple of TrueCylinder
+        The truth.
+    sigma : float
+        Standard deviation of the Gaussian noise of each coordinate, scene units.
+    family : str
+        `single` or `multi`.
+    seed : int
+        Seed of everything random.
+    params : mapping of str to number
+        The other parameters, enough to make the scene again; `scale` and `offset` if it was moved.
+    """
+
+    points: FloatArray
+    labels: NDArray[np.int32]
+    cylinders: tuple[TrueCylinder, ...]
+    sigma: float
+    family: str
+    seed: int
+    params: Mapping[str, Any]
+
+    def truth(self) -> dict[str, object]:
+        """Give the truth as a JSON object: lengths in scene units, angles in degrees."""
+        return {
+            "family": self.family,
+            "seed": self.seed,
+            "sigma": self.sigma,
+            "params": dict(self.params),
+            "points": len(self.points),
+            "cylinders": [_truth_entry(i, true) for i, true in enumerate(self.cylinders)],
+        }
+
+    def moved(self, scale: float = 1.0, offset: Sequence[float] = (0.0, 0.0, 0.0)) -> SyntheticScene:
+        """Give the scene in another frame: x -> scale x + offset.
+
+        Parameters
+        ----------
+        scale : float
+            > 0; 1000 turns metres into millimetres.
+        offset : sequence of three floats
+            In the new unit.
+
+        Raises
+        ------
+        UsageError
+            If the scale is not positive or the offset not three finite numbers.
+        """
+        shift = np.array(offset, dtype=np.float64)
+        demand(0 < scale < np.inf, "scale", f"must be > 0, not {scale}")
+        demand(shift.shape == (3,) and bool(np.isfinite(shift).all()), "offset", "must be three finite numbers")
+        cylinders = tuple(replace(true, cylinder=true.cylinder.moved(shift, scale)) for true in self.cylinders)
+        params = {
+            **self.params,
+            "scale": float(scale) * self.params.get("scale", 1.0),
+            "offset": (scale * np.array(self.params.get("offset", np.zeros(3))) + shift).tolist(),
+        }
+        return replace(
+            self, points=scale * self.points + shift, cylinders=cylinders, sigma=scale * self.sigma, params=params
+        )
+
+
+def true_cylinder(shape: Cylinder, clean: FloatArray) -> TrueCylinder:
+    """Count what is seen of a cylinder; `clean` are its points before the noise."""
+    angles = cylinder_coordinates(clean, shape.point, shape.direction)[2]
+    bins = np.floor((angles / (2 * np.pi) + 0.5) * _COVERAGE_BINS).astype(int) % _COVERAGE_BINS
+    coverage_deg = 360.0 / _COVERAGE_BINS * len(np.unique(bins))
+    ignore = len(clean) < _MIN_POINTS or coverage_deg < _MIN_COVERAGE_DEG
+    return TrueCylinder(shape, len(clean), coverage_deg, ignore)
+
+
+def _truth_entry(index: int, true: TrueCylinder) -> dict[str, object]:
+    shape = true.cylinder
+    return {
+        "id": index,
+        "axis_point": shape.point.tolist(),
+        "axis_direction": shape.direction.tolist(),
+        "radius": shape.radius,
+        "height": shape.height,
+        "start": shape.start.tolist(),
+        "end": shape.end.tolist(),
+        "points": true.points,
+        "coverage_deg": true.coverage_deg,
+        "ignore": true.ignore,
+    }
+
+
+def demand(holds: object, name: str, fault: str) -> None:
+    """Raise a UsageError about the parameter `name` unless the condition holds."""
+    if not holds:
+        raise UsageError(name, fault, "choose another value")
