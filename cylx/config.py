@@ -1,27 +1,22 @@
 """The configuration: the YAML file mirrored, one frozen model a stage, every value with its default, unit and sentence.
 
-Precedence: defaults < preset < YAML file < `--set section.key=value` < named option. `null` means "from the cloud" and is
-resolved in one place (`cylx.scene.resolve`); the resolved configuration goes into every result.
+Precedence: defaults < preset < YAML file < `--set section.key=value` < named option. `null` means "from the cloud" and
+is resolved in one place (`cylx.scene.resolve`); the resolved configuration goes into every result.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from cylx.config_faults import describe_fault
+from cylx.config_layers import Layer, file_layer, merge, nested, override_layer, preset_layer
+from cylx.errors import ConfigError
 
-def _number(value: Any) -> Any:
-    """Read `1e-3`, which YAML 1.1 takes for a string, as the number it is meant to be."""
-    if isinstance(value, str):
-        try:
-            return float(value)
-        except ValueError:
-            return value
-    return value
-
-
-Number = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]
 
@@ -43,6 +38,12 @@ class SceneConfig(Section):
     """Smallest radius looked for, scene units. Raising it drops thin pipes."""
     radius_max: Positive | None = None
     """Largest radius looked for, scene units. Lowering it drops tanks and walls that are hardly curved."""
+
+    @model_validator(mode="after")
+    def _check_radii(self) -> SceneConfig:
+        if self.radius_min is not None and self.radius_max is not None and self.radius_min > self.radius_max:
+            raise ValueError(f"radius_min {self.radius_min:g} is above radius_max {self.radius_max:g}; swap them")
+        return self
 
 
 class SlicingConfig(Section):
@@ -188,3 +189,74 @@ class Config(Section):
     """Stage 5: one cylinder a cluster."""
     verification: VerificationConfig = VerificationConfig()
     """What a cylinder must show to be accepted."""
+
+    @model_validator(mode="after")
+    def _check_sources(self) -> Config:
+        if self.slicing.planes == 0 and set(self.candidates.sources) == {"slices"}:
+            raise ValueError("there are no planes, and candidates.sources has slices alone; raise slicing.planes")
+        return self
+
+
+def load_config(
+    *,
+    path: str | Path | None = None,
+    preset: str | None = None,
+    overrides: Sequence[str] = (),
+    options: Mapping[str, object] | None = None,
+) -> Config:
+    """Put a configuration together: defaults < preset < YAML file < overrides < named options.
+
+    Parameters
+    ----------
+    path : str or Path, optional
+        A YAML file.
+    preset : str, optional
+        Where the values start from; wins over a preset named in the file or by an override.
+    overrides : sequence of str
+        Each `section.key=value`, the value written as in YAML; a later one wins.
+    options : mapping of str to object, optional
+        Values by dotted key.
+
+    Raises
+    ------
+    ConfigError
+        For a file that cannot be read, and for any unknown key, wrong type or impossible value, in one line.
+
+    Examples
+    --------
+    >>> load_config(preset="paper", overrides=["slicing.planes=20"]).slicing.planes
+    20
+    """
+    given = [_without_empty_sections(file_layer(path))] if path is not None else []
+    given += [override_layer(text) for text in overrides]
+    given += [Layer("", nested(key, value)) for key, value in (options or {}).items()]
+    given += [Layer("", {"preset": preset})] if preset is not None else []
+    for layer in given:
+        _validate(layer.values, [layer])
+    names = [layer.values["preset"] for layer in given if "preset" in layer.values]
+    merged = preset_layer(names[-1] if names else "auto").values
+    for layer in given:
+        merged = merge(merged, layer.values)
+    return _validate(merged, given)
+
+
+def preset_names() -> tuple[str, ...]:
+    """Names of the presets there are."""
+    return get_args(Config.model_fields["preset"].annotation)
+
+
+def _without_empty_sections(layer: Layer) -> Layer:
+    """Drop sections whose keys are all commented out, which YAML reads as null."""
+    sections = {name for name, field in Config.model_fields.items() if isinstance(field.default, Section)}
+    return Layer(layer.prefix, {key: v for key, v in layer.values.items() if v is not None or key not in sections})
+
+
+def _validate(values: dict[str, Any], layers: Sequence[Layer]) -> Config:
+    """Make the configuration of its values, or say which of them is wrong and in which layer it was given."""
+    try:
+        return Config.model_validate(values)
+    except ValidationError as error:
+        path, fault, remedy = describe_fault(error, Config)
+        prefixes = [layer.prefix for layer in layers if not path or path[0] in layer.values]
+        place = (prefixes[-1] if prefixes else "") + ".".join(path)
+        raise ConfigError(place.removesuffix(": ") or "configuration", fault, remedy) from None

@@ -1,0 +1,104 @@
+"""What is wrong with a configuration, in the user's words: the dotted path, the fault, the remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from pydantic import BaseModel, ValidationError
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
+
+_RANGES = {"greater_than": ">", "greater_than_equal": ">=", "less_than": "<", "less_than_equal": "<="}
+_KINDS = {
+    "bool": ("true or false", "write true or false without quotes"),
+    "int": ("an integer", "write digits alone"),
+    "float": ("a number", "write a number such as 0.05"),
+    "finite": ("a finite number", "write a number such as 0.05"),
+    "string": ("a word", "put it in quotes"),
+    "list": ("a list", "write [a, b]"),
+    "too": ("long enough", "give at least one entry"),
+    "model": ("a section", "write its keys below it, indented"),
+    "dict": ("a section", "write its keys below it, indented"),
+}
+
+
+def describe_fault(error: ValidationError, model: type[BaseModel]) -> tuple[tuple[str, ...], str, str]:
+    """Say what the first fault of a failed validation is.
+
+    Parameters
+    ----------
+    error : pydantic.ValidationError
+        The failure.
+    model : type of pydantic.BaseModel
+        What was validated.
+
+    Returns
+    -------
+    path : tuple of str
+        Keys that lead to the fault; empty for the model as a whole.
+    fault, remedy : str
+        What is wrong, and what to do about it.
+    """
+    details = error.errors(include_url=False)[0]
+    path = tuple(str(part) for part in details["loc"])
+    return path, *_fault_and_remedy(details, path, model)
+
+
+def dotted_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
+    """List the dotted path of every key of a model, sections before their keys."""
+    for name, field in model.model_fields.items():
+        yield prefix + name
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            yield from dotted_keys(field.annotation, f"{prefix}{name}.")
+
+
+def _fault_and_remedy(details: ErrorDetails, path: tuple[str, ...], model: type[BaseModel]) -> tuple[str, str]:
+    """Translate one of pydantic's errors."""
+    kind, value, context = details["type"], details["input"], details.get("ctx", {})
+    if kind in {"extra_forbidden", "missing"}:
+        return ("unknown key", _suggest_key(path, model)) if kind == "extra_forbidden" else ("is missing", "add it")
+    if kind == "literal_error":
+        return f"{_show(value)} is not one of its values", _suggest_value(value, str(context["expected"]))
+    if kind in _RANGES:
+        bound = context[{">": "gt", ">=": "ge", "<": "lt", "<=": "le"}[_RANGES[kind]]]
+        return f"{_show(value)} is out of range", f"it must be {_RANGES[kind]} {bound:g}"
+    if kind == "value_error":
+        fault, _, remedy = str(context["error"]).partition("; ")
+        return fault, remedy
+    what, remedy = _KINDS.get(kind.split("_")[0], ("what belongs here", details["msg"].lower()))
+    return f"{_show(value)} is not {what}", remedy
+
+
+def _suggest_key(path: tuple[str, ...], model: type[BaseModel]) -> str:
+    """Name the key that was probably meant, in the same section or in another one."""
+    keys = list(dotted_keys(model))
+    if path[-1] in keys:
+        return f"write '{path[-1].replace('.', ':')}' on two lines, the key indented below its section"
+    section = "".join(f"{part}." for part in path[:-1])
+    siblings = [key.removeprefix(section) for key in keys if key.startswith(section)]
+    siblings = [key for key in siblings if "." not in key]
+    if close := get_close_matches(path[-1], siblings, n=1):
+        return f"did you mean '{close[0]}'?"
+    if elsewhere := [key for key in keys if get_close_matches(path[-1], [key.rpartition(".")[2]], cutoff=0.8)]:
+        return f"did you mean '{elsewhere[0]}'?"
+    return f"the keys here are {', '.join(siblings)}"
+
+
+def _suggest_value(value: object, expected: str) -> str:
+    """Name the value that was probably meant, or all there are; `expected` is pydantic's list of them."""
+    choices = [word for word in expected.split("'") if word not in {"", ", ", " or "}]
+    close = get_close_matches(str(value), choices, n=1)
+    return f"did you mean '{close[0]}'?" if close else f"choose {' or '.join(choices)}"
+
+
+def _show(value: object) -> str:
+    """Show a value as it would stand in YAML, shortened."""
+    if value is None or isinstance(value, bool):
+        return str(value).lower().replace("none", "null")
+    if isinstance(value, dict):
+        return "a section"
+    text = " ".join(repr(value).split())
+    return text if len(text) <= 40 else f"{text[:36]} ..."

@@ -1,0 +1,256 @@
+"""The result of a run as a JSON object, `NAME.cylinders.json`: its keys, their order, their meaning.
+
+Lengths are in the unit of the input, angles in degrees. The file holds no NaN, no times and no folder names: the same
+input, configuration and seed give the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from math import degrees, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
+
+from cylx import __version__
+from cylx.config_faults import describe_fault
+from cylx.errors import InputError
+
+if TYPE_CHECKING:
+    from cylx.records import CylinderFit, Extraction, StageReport
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Length = Annotated[Number, Field(ge=0)]
+Count = Annotated[int, Field(ge=0)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Annotated[list[Number], Field(min_length=5, max_length=5)]], Field(min_length=5, max_length=5)]
+
+
+class Part(BaseModel):
+    """A part of the result: unknown keys, wrong types and numbers that are not finite are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+
+
+class Bounds(Part):
+    """The smallest box along the coordinate axes that holds all finite points."""
+
+    min: Vector
+    """Smallest coordinates, scene units."""
+    max: Vector
+    """Largest coordinates, scene units."""
+
+
+class Input(Part):
+    """What was looked at."""
+
+    file: str
+    """Name of the file without its folder; `-` for standard input, `<array>` for an array."""
+    format: str
+    """`ply`, `pcd`, `xyz`, … or `array`."""
+    points: Count
+    """Number of points, those without finite coordinates included."""
+    sha256: str | None = None
+    """Digest of the bytes read; absent for an array."""
+    bounds: Bounds
+    """Bounding box of the finite points."""
+
+
+class SceneScale(Part):
+    """What the cloud says about itself."""
+
+    spacing: Length
+    """Typical distance of neighbouring points on a surface, scene units."""
+    noise: Length
+    """Standard deviation of the points about their surface, scene units."""
+
+
+class Stage(Part):
+    """What a stage looked at, what it kept, and why it dropped the rest."""
+
+    name: str
+    """The stage."""
+    considered: Count
+    """Things that came in."""
+    kept: Count
+    """Things that went on."""
+    rejected: dict[str, Count]
+    """Reason to count."""
+
+
+class Uncertainty(Part):
+    """Standard deviations of a cylinder's parameters."""
+
+    radius: Length
+    """Of the radius, scene units."""
+    axis_angle_deg: Length
+    """Of the direction of the axis, degrees."""
+    axis_offset: Length
+    """Of the place of the axis at its middle, scene units."""
+    covariance: Matrix
+    """Of two offsets of the axis, its two tilts and the radius; scene units and radians."""
+
+
+class ResultCylinder(Part):
+    """A cylinder and the evidence for it."""
+
+    id: Count
+    """Position in the list; `cylinder_id` of its points in the annotated PLY."""
+    axis_point: Vector
+    """Middle of the visible extent, on the axis, scene units."""
+    axis_direction: Vector
+    """Unit vector; its largest component is positive."""
+    radius: Annotated[Number, Field(gt=0)]
+    """Scene units."""
+    height: Length
+    """Length of the visible extent, scene units."""
+    start: Vector
+    """Lower end of the visible extent, on the axis, scene units."""
+    end: Vector
+    """Upper end of the visible extent, on the axis, scene units."""
+    inliers: Count
+    """Points that carry its `id`."""
+    rmse: Length
+    """Root mean square distance of the inliers to the surface, scene units."""
+    coverage_deg: Annotated[Number, Field(ge=0, le=360)]
+    """Angle about the axis that the inliers cover, degrees."""
+    support: Count
+    """Candidates in its cluster."""
+    payoff: Number
+    """Mean payoff of its cluster, 0 to 1."""
+    confidence: Annotated[Number, Field(ge=0, le=1)] | None = None
+    """Probability that this is a cylinder of the scene; absent where it was not computed."""
+    uncertainty: Uncertainty | None = None
+    """Standard deviations of the parameters; absent where they were not computed."""
+    evidence: dict[str, Number] | None = None
+    """What the verification measured, by the name of the test; absent where nothing was measured."""
+
+    @classmethod
+    def of(cls, index: int, fit: CylinderFit) -> ResultCylinder:
+        """Write down cylinder number `index` of an extraction."""
+        shape = fit.cylinder
+        evidence = {name: float(value) for name, value in fit.evidence.items() if isfinite(value)}
+        return cls(
+            id=index,
+            axis_point=_numbers(shape.point),
+            axis_direction=_numbers(shape.direction),
+            radius=shape.radius,
+            height=shape.height,
+            start=_numbers(shape.start),
+            end=_numbers(shape.end),
+            inliers=int(fit.inliers),
+            rmse=float(fit.rmse),
+            coverage_deg=min(degrees(fit.coverage), 360.0),
+            support=int(fit.support),
+            payoff=float(fit.payoff),
+            evidence=evidence or None,
+        )
+
+
+class Result(Part):
+    """The cylinders of one cloud, how they were found, and with which settings they are found again."""
+
+    model_config = ConfigDict(title="cylx.cylinders/1")
+
+    schema_id: Literal["cylx.cylinders/1"] = Field(default="cylx.cylinders/1", alias="schema")
+    """Name and version of this format."""
+    cylx_version: str
+    """Version of cylx that wrote it."""
+    input: Input
+    """What was looked at."""
+    method: Literal["gt"] = "gt"
+    """How the cylinders were found; `gt` is the clustering game."""
+    config: dict[str, JsonValue]
+    """The resolved configuration, every value."""
+    scene: SceneScale
+    """What the cloud says about itself."""
+    stages: list[Stage]
+    """Counts per stage, in order."""
+    cylinders: list[ResultCylinder]
+    """The cylinders; empty if there are none."""
+    warnings: list[str]
+    """What a user should know before trusting the answer."""
+
+    @classmethod
+    def of(cls, extraction: Extraction) -> Result:
+        """Write down an extraction.
+
+        Parameters
+        ----------
+        extraction : Extraction
+            What a run found out.
+        """
+        return cls(
+            cylx_version=__version__,
+            input=_input(extraction),
+            config=extraction.config.model_dump(mode="json"),
+            scene=SceneScale(spacing=float(extraction.scene.spacing), noise=float(extraction.scene.noise)),
+            stages=[_stage(report) for report in extraction.stages],
+            cylinders=[ResultCylinder.of(i, fit) for i, fit in enumerate(extraction.cylinders)],
+            warnings=list(extraction.warnings),
+        )
+
+    @classmethod
+    def parse(cls, mapping: Mapping[str, Any], place: str) -> Result:
+        """Read a JSON object.
+
+        Parameters
+        ----------
+        mapping : mapping
+            The object.
+        place : str
+            Its name in an error, such as the file.
+
+        Raises
+        ------
+        InputError
+            If it is not a result of this version of the format.
+        """
+        try:
+            return cls.model_validate(mapping)
+        except ValidationError as error:
+            path, fault, remedy = describe_fault(error, cls)
+            raise InputError(": ".join(filter(None, [place, ".".join(path)])), fault, remedy) from None
+
+    def to_object(self) -> dict[str, Any]:
+        """Give the JSON object; what was not computed is left out."""
+        content = self.model_dump(mode="json", by_alias=True)
+        for part in [content["input"], *content["cylinders"]]:
+            for key in [key for key, value in part.items() if value is None]:
+                del part[key]
+        return content
+
+    def to_json(self) -> str:
+        """Give the text of the file, with a newline at its end."""
+        return json.dumps(self.to_object(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def result_schema() -> dict[str, Any]:
+    """Give the JSON schema of the result file."""
+    return Result.model_json_schema(by_alias=True)
+
+
+def _input(extraction: Extraction) -> Input:
+    """Write down what was looked at."""
+    cloud = extraction.cloud
+    name = cloud.source.file if cloud.source.format == "array" else Path(cloud.source.file).name
+    return Input(
+        file=name.encode("utf-8", "backslashreplace").decode("utf-8"),
+        format=cloud.source.format,
+        points=cloud.rows,
+        sha256=cloud.source.sha256,
+        bounds=Bounds(min=_numbers(cloud.points.min(axis=0)), max=_numbers(cloud.points.max(axis=0))),
+    )
+
+
+def _stage(report: StageReport) -> Stage:
+    """Write down a stage's counts."""
+    rejected = {reason: int(count) for reason, count in report.rejected.items()}
+    return Stage(name=report.name, considered=int(report.considered), kept=int(report.kept), rejected=rejected)
+
+
+def _numbers(vector: Iterable[float]) -> list[float]:
+    """Turn a vector into plain floats, without negative zeros."""
+    return [float(x) + 0.0 for x in vector]
