@@ -4,8 +4,8 @@ Every scene is determined by its parameters and its seed. Points of even density
 isotropic Gaussian noise, and come in random order.
 """
 
-from cylx.synthetic.multi import multi
+from cylx.synthetic.paper import single
+from cylx.synthetic.room import multi
 from cylx.synthetic.scene import NOISE, OTHER_SURFACE, SyntheticScene, TrueCylinder
-from cylx.synthetic.single import single
 
 __all__ = ["NOISE", "OTHER_SURFACE", "SyntheticScene", "TrueCylinder", "multi", "single"]

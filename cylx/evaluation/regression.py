@@ -1,0 +1,218 @@
+"""Whether two results are the same cylinders within tolerances: for regression runs on fixtures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Literal
+
+import numpy as np
+
+from cylx.errors import UsageError
+from cylx.evaluation.matching import (
+    CylinderTable,
+    FloatArray,
+    PairErrors,
+    match_one_to_one,
+    pair_errors,
+    read_cylinders,
+    require_usable,
+)
+
+Kind = Literal["missing", "extra", "moved", "resized", "recounted"]
+
+_SAME_ANGLE_DEG = 5.0  # within these, two cylinders are the same one with other numbers
+_SAME_OFFSET = 0.25
+_SAME_RADIUS = 0.15
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tolerances:
+    """How much two results may differ.
+
+    Parameters
+    ----------
+    angle_deg : float
+        Between the axes, degrees.
+    offset : float
+        Between the axes at the middle of either cylinder, in radii.
+    radius : float
+        Relative.
+    height : float
+        Of the heights, and of the mid-points along the axis, relative to the larger height plus radius.
+    inliers : float
+        Relative.
+    """
+
+    angle_deg: float = 0.1
+    offset: float = 0.01
+    radius: float = 0.005
+    height: float = 0.05
+    inliers: float = 0.05
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not value >= 0:
+                raise UsageError(f"tolerance {field.name}", f"must be >= 0, not {value}", "give a number >= 0")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Difference:
+    """One thing in which two results differ.
+
+    Parameters
+    ----------
+    kind : str
+        `missing` (only in a), `extra` (only in b), `moved`, `resized` or `recounted`.
+    id_a, id_b : int or None
+        The cylinder in a and in b.
+    what : str
+        `cylinder`, `angle_deg`, `offset`, `shift` (along the axis), `height`, `radius` or `inliers`.
+    a, b : float or None
+        The values in a and b, where each has one of its own; the radius of a missing or extra cylinder.
+    difference, tolerance : float or None
+        What they differ by and what was allowed, both in the unit of the tolerance.
+    """
+
+    kind: Kind
+    id_a: int | None
+    id_b: int | None
+    what: str
+    a: float | None = None
+    b: float | None = None
+    difference: float | None = None
+    tolerance: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """What two results have in common and what not.
+
+    Parameters
+    ----------
+    cylinders_a, cylinders_b, matched : int
+        Cylinders in a, in b, and in both.
+    differences : tuple of Difference
+        In the order of a, what is only in b last; empty if the results are the same.
+    """
+
+    cylinders_a: int
+    cylinders_b: int
+    matched: int
+    differences: tuple[Difference, ...]
+
+    @property
+    def same(self) -> bool:
+        """Whether nothing differs by more than its tolerance."""
+        return not self.differences
+
+    def to_dict(self) -> dict[str, object]:
+        """Give everything as a JSON object."""
+        return {
+            "same": self.same,
+            "cylinders_a": self.cylinders_a,
+            "cylinders_b": self.cylinders_b,
+            "matched": self.matched,
+            "differences": [asdict(difference) for difference in self.differences],
+        }
+
+
+def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tolerances = Tolerances()) -> Comparison:
+    """Say whether two results are the same cylinders, in whatever order.
+
+    Heights and inliers are compared where both results have them. A difference equal to its tolerance is allowed.
+
+    Parameters
+    ----------
+    a, b : mapping
+        JSON objects with a list `cylinders`.
+    tolerances : Tolerances
+        What is allowed.
+
+    Raises
+    ------
+    InputError
+        If either is malformed, or a cylinder is not finite.
+    """
+    left, right = read_cylinders(a, "a"), read_cylinders(b, "b")
+    require_usable(left, "a")
+    require_usable(right, "b")
+    errors = _mutual_errors(left, right)
+    pairs = _same_cylinders(left, right, errors, tolerances)
+    differences: list[Difference] = []
+    for i, id_a in enumerate(left.ids):
+        if i in pairs:
+            differences += _differences(left, right, (i, pairs[i]), errors, tolerances)
+        else:
+            lost = float(left.radii[i])
+            differences.append(Difference(kind="missing", id_a=id_a, id_b=None, what="cylinder", a=lost))
+    for j in sorted(set(range(len(right))) - set(pairs.values())):
+        new = float(right.radii[j])
+        differences.append(Difference(kind="extra", id_a=None, id_b=right.ids[j], what="cylinder", b=new))
+    return Comparison(len(left), len(right), len(pairs), tuple(differences))
+
+
+def _mutual_errors(left: CylinderTable, right: CylinderTable) -> PairErrors:
+    """Measure every pair from both sides and take the larger error; shifts relative to the longer cylinder."""
+    forth, back = pair_errors(left, right), pair_errors(right, left)
+    known = np.isfinite(left.heights)[:, None] & np.isfinite(right.heights)
+    shift = np.maximum(forth.shift, back.shift.T) / np.maximum(_lengths(left)[:, None], _lengths(right))
+    return PairErrors(
+        angle_deg=forth.angle_deg,
+        offset=np.maximum(forth.offset, back.offset.T),
+        radius=np.maximum(forth.radius, back.radius.T),
+        shift=np.where(known, shift, 0.0),
+    )
+
+
+def _same_cylinders(
+    left: CylinderTable, right: CylinderTable, errors: PairErrors, tolerances: Tolerances
+) -> dict[int, int]:
+    """Say which position in b is that in a: about the same axis and radius, and side by side along it."""
+    lengths = _lengths(left)[:, None], _lengths(right)
+    beside = 0.5 * (1 + np.minimum(*lengths) / np.maximum(*lengths))
+    limited = (
+        (errors.angle_deg, max(_SAME_ANGLE_DEG, tolerances.angle_deg)),
+        (errors.offset, max(_SAME_OFFSET, tolerances.offset)),
+        (errors.radius, max(_SAME_RADIUS, tolerances.radius)),
+        (errors.shift, np.maximum(beside, tolerances.height)),
+    )
+    admissible = np.all([error <= limit for error, limit in limited], axis=0)
+    rows, columns = match_one_to_one(np.sum([error / limit for error, limit in limited], axis=0), admissible)
+    return dict(zip(rows.tolist(), columns.tolist(), strict=True))
+
+
+def _differences(
+    left: CylinderTable, right: CylinderTable, pair: tuple[int, int], errors: PairErrors, tolerances: Tolerances
+) -> Iterator[Difference]:
+    """Name what differs between the two cylinders of a pair by more than its tolerance."""
+    i, j = pair
+    heights, inliers = (left.heights[i], right.heights[j]), (left.inliers[i], right.inliers[j])
+    height = abs(heights[0] - heights[1]) / max(_lengths(left)[i], _lengths(right)[j])
+    count = abs(inliers[0] - inliers[1]) / max(*inliers, 1.0)
+    measured: tuple[tuple[Kind, str, tuple[float, float] | None, float, float], ...] = (
+        ("moved", "angle_deg", None, errors.angle_deg[pair], tolerances.angle_deg),
+        ("moved", "offset", None, errors.offset[pair], tolerances.offset),
+        ("moved", "shift", None, errors.shift[pair], tolerances.height),
+        ("resized", "radius", (left.radii[i], right.radii[j]), errors.radius[pair], tolerances.radius),
+        ("resized", "height", heights, height, tolerances.height),
+        ("recounted", "inliers", inliers, count, tolerances.inliers),
+    )
+    for kind, what, values, difference, tolerance in measured:
+        if difference > tolerance:  # false where one of the two does not know
+            yield Difference(
+                kind=kind,
+                id_a=left.ids[i],
+                id_b=right.ids[j],
+                what=what,
+                a=None if values is None else float(values[0]),
+                b=None if values is None else float(values[1]),
+                difference=float(difference),
+                tolerance=tolerance,
+            )
+
+
+def _lengths(table: CylinderTable) -> FloatArray:
+    """Give height plus radius: what differences along the axis are measured in."""
+    return np.asarray(np.nan_to_num(table.heights) + table.radii)

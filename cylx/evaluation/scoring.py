@@ -1,0 +1,183 @@
+"""How right a result is: precision, recall and errors against a truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from cylx.errors import UsageError
+from cylx.evaluation.matching import MaskArray, match_one_to_one, pair_errors, read_cylinders, require_usable
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """A true cylinder and the one that was found for it.
+
+    Parameters
+    ----------
+    truth_id, result_id : int
+        Their `id`, or position in the list where they have none.
+    angle_deg : float
+        Angle between the axes, degrees.
+    offset : float
+        Distance of the true mid-point from the found axis, in true radii.
+    radius : float
+        Difference of the radii, relative to the true one, >= 0.
+    """
+
+    truth_id: int
+    result_id: int
+    angle_deg: float
+    offset: float
+    radius: float
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """The median, mean and maximum of an error over the matches."""
+
+    median: float
+    mean: float
+    max: float
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """What a result is worth.
+
+    Parameters
+    ----------
+    truth, predicted, matched : int
+        True cylinders that must be found, cylinders in the result, and pairs of both.
+    duplicates : int
+        Further cylinders of the result on a true one that has its match already; they count as false.
+    ignored : int
+        Cylinders of the result on true ones that need not be found; they count neither way.
+    unusable : int
+        Entries of the result that are no cylinder (not finite, no direction); they are left out.
+    precision, recall, f1 : float
+        In [0, 1]; all 1 where there is nothing to find and nothing was found.
+    angle_deg, offset, radius : Spread or None
+        Errors of the matches, as in `Match`; None without a match.
+    pairs : tuple of Match
+        In the order of the truth.
+    missed : tuple of int
+        `id` of true cylinders without a match.
+    false : tuple of int
+        `id` of cylinders in the result without a match, duplicates included.
+    """
+
+    truth: int
+    predicted: int
+    matched: int
+    duplicates: int
+    ignored: int
+    unusable: int
+    precision: float
+    recall: float
+    f1: float
+    angle_deg: Spread | None
+    offset: Spread | None
+    radius: Spread | None
+    pairs: tuple[Match, ...]
+    missed: tuple[int, ...]
+    false: tuple[int, ...]
+
+    def to_dict(self) -> dict[str, object]:
+        """Give everything as a JSON object, keys in the order above."""
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
+
+
+def evaluate(
+    truth: Mapping[str, object],
+    result: Mapping[str, object],
+    *,
+    angle_deg: float = 5.0,
+    offset: float = 0.25,
+    radius: float = 0.15,
+) -> Evaluation:
+    """Match a result with a truth, one to one, and say how good it is.
+
+    A pair is admissible if its errors (see `Match`) are all below the given limits. Among the admissible pairs as
+    many as possible are matched, at the least sum of errors over limits. True cylinders marked `ignore` need not be
+    found.
+
+    Parameters
+    ----------
+    truth, result : mapping
+        JSON objects with a list `cylinders`.
+    angle_deg : float
+        Limit of the axis angle, degrees.
+    offset : float
+        Limit of the distance from the axis, in true radii.
+    radius : float
+        Limit of the relative radius error.
+
+    Raises
+    ------
+    InputError
+        If either is malformed, or a true cylinder is not finite.
+    UsageError
+        If a limit is not positive.
+    """
+    for name, limit in (("angle_deg", angle_deg), ("offset", offset), ("radius", radius)):
+        if not limit > 0:
+            raise UsageError(f"limit {name}", f"must be > 0, not {limit}", "give a number > 0")
+    known = read_cylinders(truth, "truth")
+    require_usable(known, "truth")
+    given = read_cylinders(result, "result")
+    found = given.subset(given.usable)
+
+    errors = pair_errors(known, found)
+    admissible = (errors.angle_deg < angle_deg) & (errors.offset < offset) & (errors.radius < radius)
+    asked = ~known.ignore
+    cost = errors.angle_deg / angle_deg + errors.offset / offset + errors.radius / radius
+    rows, columns = match_one_to_one(cost, admissible & asked[:, None])
+
+    unmatched = np.ones(len(found), dtype=bool)
+    unmatched[columns] = False
+    duplicate = unmatched & admissible[asked].any(axis=0)
+    ignored = unmatched & ~duplicate & admissible[known.ignore].any(axis=0)
+    missed = asked.copy()
+    missed[rows] = False
+    false = unmatched & ~ignored
+    pairs = tuple(
+        Match(known.ids[i], found.ids[j], *(float(e[i, j]) for e in (errors.angle_deg, errors.offset, errors.radius)))
+        for i, j in zip(rows, columns, strict=True)
+    )
+    precision, recall, f1 = _rates(len(pairs), int(false.sum()), int(missed.sum()))
+    return Evaluation(
+        truth=int(asked.sum()),
+        predicted=len(found),
+        matched=len(pairs),
+        duplicates=int(duplicate.sum()),
+        ignored=int(ignored.sum()),
+        unusable=len(given) - len(found),
+        precision=precision,
+        recall=recall,
+        f1=f1,
+        angle_deg=_spread([pair.angle_deg for pair in pairs]),
+        offset=_spread([pair.offset for pair in pairs]),
+        radius=_spread([pair.radius for pair in pairs]),
+        pairs=pairs,
+        missed=_chosen(known.ids, missed),
+        false=_chosen(found.ids, false),
+    )
+
+
+def _rates(matched: int, false: int, missed: int) -> tuple[float, float, float]:
+    if not matched + false + missed:
+        return 1.0, 1.0, 1.0
+    precision = matched / (matched + false) if matched + false else 0.0
+    recall = matched / (matched + missed) if matched + missed else 0.0
+    return precision, recall, 2 * matched / (2 * matched + false + missed)
+
+
+def _spread(values: list[float]) -> Spread | None:
+    return Spread(float(np.median(values)), float(np.mean(values)), max(values)) if values else None
+
+
+def _chosen(ids: tuple[int, ...], mask: MaskArray) -> tuple[int, ...]:
+    return tuple(id_ for id_, wanted in zip(ids, mask, strict=True) if wanted)
