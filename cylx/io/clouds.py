@@ -1,0 +1,156 @@
+"""Point clouds from files of any format, and into them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from cylx.errors import InputError, OutputError, UsageError
+from cylx.io.inputs import Input, open_input
+from cylx.io.names import coordinate_names, mended_names
+from cylx.io.outputs import open_output
+from cylx.io.pcd import read_pcd, write_pcd
+from cylx.io.ply import BLOCK, ply_type, read_ply, write_ply
+from cylx.io.xyz import SUFFIXES as TEXT_SUFFIXES
+from cylx.io.xyz import read_xyz, write_xyz
+from cylx.records import PointCloud, Source
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+
+    from numpy.typing import NDArray
+
+_READERS: dict[str, Callable[[Input], NDArray[np.void]]] = {"ply": read_ply, "pcd": read_pcd, "xyz": read_xyz}
+
+
+def read_cloud(path: str | Path, *, format: str | None = None) -> PointCloud:  # noqa: A002
+    """Read a point cloud with all properties of its points.
+
+    Parameters
+    ----------
+    path : str or Path
+        A PLY, PCD or text file, or `-` for standard input.
+    format : {"ply", "pcd", "xyz"}, optional
+        What it is; by default the suffix says so, and where it does not, the content.
+
+    Returns
+    -------
+    PointCloud
+        Its points in float64. Rows with a coordinate that is not finite are in its table only.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is damaged, or has no finite point.
+    UsageError
+        If `format` is none of those above.
+    """
+    if format is not None and format not in _READERS:
+        raise UsageError("format", f"unknown format {format!r}", f"use one of {', '.join(_READERS)}")
+    with open_input(path) as source:
+        kind = format or _recognise(source, Path(path).suffix.lower())
+        try:
+            table = _READERS[kind](source)
+        except MemoryError:
+            raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
+        return _cloud(table, source.place, Source(str(path), kind, source.sha256))
+
+
+def write_cloud(
+    path: str | Path,
+    points: NDArray[Any],
+    *,
+    properties: Mapping[str, NDArray[Any]] | None = None,
+    overwrite: bool = False,
+    dtype: Literal["f4", "f8"] = "f8",
+) -> None:
+    """Write points and their properties as binary PLY, binary PCD or text, as the suffix says; `-` is PLY.
+
+    Parameters
+    ----------
+    path : str or Path
+        A name that ends in .ply, .pcd, .xyz, .txt, .csv, .pts or .asc, or `-` for standard output.
+    points : ndarray of shape (N, 3)
+        Scene units.
+    properties : mapping of str to ndarray of shape (N,), optional
+        Further properties, in their order, in their types as far as the format has them.
+    overwrite : bool
+        Whether a file that is there already may be replaced.
+    dtype : {"f8", "f4"}
+        Type of the coordinates.
+
+    Raises
+    ------
+    OutputError
+        If the suffix is unknown, or the file cannot be written.
+    """
+    suffix = ".ply" if str(path) == "-" else Path(path).suffix.lower()
+    if suffix not in (".ply", ".pcd", *TEXT_SUFFIXES):
+        known = ", ".join((".ply", ".pcd", *TEXT_SUFFIXES))
+        raise OutputError(str(path), f"unknown suffix {suffix!r}", f"use one of {known}")
+    table = _table(points, properties or {}, dtype)
+    with open_output(path, overwrite=overwrite) as file:
+        if suffix == ".ply":
+            packed = np.dtype([(name, ply_type(table.dtype[name])) for name in table.dtype.names or ()])
+            write_ply(file, packed, len(table), (part.astype(packed) for part in _blocks(table)))
+        elif suffix == ".pcd":
+            write_pcd(file, table)
+        else:
+            write_xyz(file, suffix, table)
+
+
+def _recognise(source: Input, suffix: str) -> str:
+    if suffix in (".ply", ".pcd"):
+        return suffix[1:]
+    head = source.head(1024).lstrip()
+    if head.startswith((b"ply\n", b"ply\r")):
+        return "ply"
+    if head.startswith((b"# .PCD", b"#.PCD", b"VERSION", b"FIELDS")):
+        return "pcd"
+    if suffix not in TEXT_SUFFIXES and b"\0" in head:
+        raise InputError(source.place, "is neither PLY nor PCD nor text", "convert it to PLY")
+    return "xyz"
+
+
+def _cloud(table: NDArray[np.void], place: str, source: Source) -> PointCloud:
+    names = table.dtype.names or ()
+    points = np.empty((len(table), 3))
+    with np.errstate(all="ignore"):  # a signalling NaN is a NaN
+        for axis, name in enumerate(coordinate_names(names)):
+            points[:, axis] = table[name]
+    valid = np.asarray(np.isfinite(points).all(axis=1))
+    if not valid.any():
+        raise InputError(place, "no point has finite coordinates", "export the file again")
+    if not valid.all():
+        return PointCloud(points[valid], table, valid, source)
+    bare = names == ("x", "y", "z") and all(table.dtype[name] == np.float64 for name in names)
+    return PointCloud(points, None if bare else table, None, source)
+
+
+def _table(points: NDArray[Any], properties: Mapping[str, NDArray[Any]], dtype: str) -> NDArray[np.void]:
+    columns = {axis: points[:, place] for place, axis in enumerate("xyz")}
+    names = mended_names([*columns, *properties])
+    values = [*columns.values(), *(np.asarray(value) for value in properties.values())]
+    types = [np.dtype(dtype)] * 3 + [_plain_type(value.dtype) for value in values[3:]]
+    table = np.empty(len(points), np.dtype(list(zip(names, types, strict=True))))
+    for name, value in zip(names, values, strict=True):
+        if value.shape != (len(points),):
+            raise ValueError(f"{name} must have shape ({len(points)},), not {value.shape}")
+        table[name] = value
+    return table
+
+
+def _plain_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
+    """Give the number type, common to PLY and PCD but for integers of 8 bytes, that holds values of a type."""
+    if dtype.kind not in "biuf":
+        raise ValueError(f"a property must be made of numbers, not of {dtype}")
+    if dtype.kind == "f":
+        return np.dtype("f4" if dtype.itemsize <= 4 else "f8")
+    return np.dtype("u1") if dtype.kind == "b" else dtype
+
+
+def _blocks(table: NDArray[np.void]) -> Iterator[NDArray[np.void]]:
+    for start in range(0, len(table), BLOCK):
+        yield table[start : start + BLOCK]

@@ -1,0 +1,161 @@
+"""Inputs on disk or standard input, opened once, measured and hashed before anybody looks into them."""
+
+from __future__ import annotations
+
+import difflib
+import hashlib
+import json
+import os
+import stat
+import sys
+import tempfile
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, BinaryIO, NoReturn
+
+from cylx.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_BLOCK = 1 << 20
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Input:
+    """A file that can be read from any position.
+
+    Parameters
+    ----------
+    place : str
+        What errors call it.
+    file : binary file
+        A real file, so that it can be mapped into memory.
+    size : int
+        Bytes in it.
+    sha256 : str
+        Digest of these bytes.
+    """
+
+    place: str
+    file: BinaryIO
+    size: int
+    sha256: str
+
+    def head(self, size: int) -> bytes:
+        """Give up to `size` bytes from the beginning."""
+        self.file.seek(0)
+        return self.file.read(size)
+
+
+@contextmanager
+def open_input(path: str | Path) -> Iterator[Input]:
+    """Open a file, a pipe or standard input (`-`); what has no positions is copied to an unnamed file first.
+
+    Raises
+    ------
+    InputError
+        If there is nothing there, or nothing in it, or it may not be read.
+    """
+    place = "standard input" if str(path) == "-" else str(path)
+    with _open(path, place) as stream:
+        try:
+            if str(path) != "-" and stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+                yield Input(place, stream, *_measure(stream, place))
+                return
+            with tempfile.TemporaryFile() as copy:
+                yield Input(place, copy, *_measure(stream, place, copy))
+        except OSError as error:
+            _refuse_os_error(place, error)
+
+
+def read_json(path: str | Path) -> dict[str, Any]:
+    """Read a JSON object.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or `-` for standard input.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not JSON, or is not an object.
+    """
+    with open_input(path) as source:
+        data = source.head(source.size)
+    place = source.place
+    try:
+        document = json.loads(data.decode("utf-8-sig"), parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        where = f"{place}:{error.lineno}:{error.colno}"
+        raise InputError(where, f"not JSON: {_lowered(error.msg)}", "give a JSON file as cylx writes it") from None
+    except UnicodeDecodeError:
+        raise InputError(place, "not JSON: not UTF-8 text", "give a JSON file as cylx writes it") from None
+    except (ValueError, RecursionError) as error:
+        fault = "nested too deeply" if isinstance(error, RecursionError) else _lowered(str(error))
+        raise InputError(place, f"not JSON: {fault}", "give a JSON file as cylx writes it") from None
+    if not isinstance(document, dict):
+        raise InputError(place, "holds no JSON object", "give a JSON file as cylx writes it")
+    return document
+
+
+def excerpt(text: str) -> str:
+    """Quote a piece of somebody's file so that it fits on one line of ours."""
+    return ascii(text if len(text) <= 40 else text[:37] + "...")
+
+
+def _open(path: str | Path, place: str) -> AbstractContextManager[BinaryIO]:
+    if str(path) == "-":
+        if sys.stdin is None:
+            raise InputError(place, "is closed", "give a file, or something to read through a pipe")
+        return nullcontext(sys.stdin.buffer)
+    try:
+        return Path(path).open("rb")
+    except FileNotFoundError:
+        raise InputError(place, "no such file", _remedy_for_missing(Path(path))) from None
+    except IsADirectoryError:
+        raise InputError(place, "is a folder", "give the files in it") from None
+    except PermissionError:
+        if Path(path).is_dir():
+            raise InputError(place, "is a folder", "give the files in it") from None
+        raise InputError(place, "may not be read", "ask its owner for the permission") from None
+    except (OSError, ValueError) as error:
+        _refuse_os_error(place, error)
+
+
+def _measure(stream: BinaryIO, place: str, copy: IO[bytes] | None = None) -> tuple[int, str]:
+    digest, size = hashlib.sha256(), 0
+    while block := stream.read(_BLOCK):
+        digest.update(block)
+        size += len(block)
+        if copy is not None:
+            copy.write(block)
+    if copy is not None:
+        copy.flush()
+    if size == 0:
+        raise InputError(place, "is empty", "give a file with points")
+    return size, digest.hexdigest()
+
+
+def _refuse_os_error(place: str, error: OSError | ValueError) -> NoReturn:
+    fault = getattr(error, "strerror", None) or str(error)
+    raise InputError(place, f"cannot be read: {_lowered(fault)}", "check the path and the disk") from None
+
+
+def _remedy_for_missing(path: Path) -> str:
+    try:
+        siblings = [entry.name for entry in path.parent.iterdir()]
+    except OSError:
+        return "check the path"
+    close = difflib.get_close_matches(path.name, siblings, n=1)
+    return f"did you mean {str(path.with_name(close[0]))!r}?" if close else "check the path"
+
+
+def _refuse_constant(name: str) -> NoReturn:
+    raise ValueError(f"{name} is not a number in JSON")
+
+
+def _lowered(text: str) -> str:
+    return text[:1].lower() + text[1:]

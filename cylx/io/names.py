@@ -1,0 +1,61 @@
+"""Names of properties: which of them are coordinates, and what to call those that a file cannot hold."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+
+def coordinate_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Find the properties x, y and z, in this order; capital letters will do where there are no small ones.
+
+    Returns
+    -------
+    tuple of str
+        Three names, or fewer if some are missing.
+
+    Examples
+    --------
+    >>> coordinate_names(["intensity", "z", "X", "y"])
+    ('X', 'y', 'z')
+    """
+    have = set(names)
+    return tuple(name for axis in "xyz" for name in (axis, axis.upper()) if name in have and not _shadowed(name, have))
+
+
+def missing_coordinates(names: Iterable[str]) -> str:
+    """Name the coordinates that are not among `names`, for an error.
+
+    Examples
+    --------
+    >>> missing_coordinates(["x", "intensity"])
+    'y, z'
+    """
+    found = [name.lower() for name in coordinate_names(names)]
+    return ", ".join(axis for axis in "xyz" if axis not in found)
+
+
+def mended_names(names: Sequence[str]) -> list[str]:
+    """Make names that PLY can hold: printable ASCII without spaces, none of them twice.
+
+    Examples
+    --------
+    >>> mended_names(["scan angle", "a", "a", ""])
+    ['scan_angle', 'a', 'a_2', 'property']
+    """
+    mended: list[str] = []
+    for name in names:
+        stem = re.sub(r"[^!-~]+", "_", name.strip()) or "property"
+        candidate, count = stem, 1
+        while candidate in mended:
+            count += 1
+            candidate = f"{stem}_{count}"
+        mended.append(candidate)
+    return mended
+
+
+def _shadowed(name: str, have: set[str]) -> bool:
+    return name.isupper() and name.lower() in have

@@ -1,0 +1,154 @@
+"""Outputs that appear whole or not at all."""
+
+from __future__ import annotations
+
+import errno
+import os
+import secrets
+import stat
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, NoReturn
+
+from cylx.errors import OutputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_STDOUT = ("-", "/dev/stdout")
+
+
+def check_writable(path: str | Path, *, overwrite: bool) -> None:
+    """Refuse an output that could not be written, before anything is computed for it.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or `-` for standard output.
+    overwrite : bool
+        Whether a file that is there already may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the output exists, is a folder, or its folder is missing or cannot be written to.
+    """
+    if str(path) in _STDOUT:
+        if sys.stdout is None:
+            raise OutputError("standard output", "is closed", "give a file name")
+        return
+    place = str(path)
+    mode = _mode(path)
+    if mode is None:
+        _check_folder(_target(path).parent, place)
+    elif stat.S_ISDIR(mode):
+        raise OutputError(place, "is a folder", "give a file name")
+    elif not os.access(path, os.W_OK):
+        raise OutputError(place, "is read-only", "choose another name, or change its permissions")
+    elif stat.S_ISREG(mode):
+        if not overwrite:
+            raise OutputError(place, "exists already", "choose another name, or give --overwrite")
+        _check_folder(_target(path).parent, place)
+
+
+@contextmanager
+def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
+    """Open an output under a temporary name and move it to its own when all went well.
+
+    Symbolic links are followed. Standard output, devices and pipes are written to as they are. A closed pipe raises
+    `BrokenPipeError`, which is nobody's fault.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or `-` for standard output.
+    overwrite : bool
+        Whether a file that is there already may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the output is refused by `check_writable`, or cannot be written after all.
+    """
+    check_writable(path, overwrite=overwrite)
+    try:
+        if str(path) in _STDOUT:
+            sys.stdout.flush()  # whatever was printed comes first
+            yield sys.stdout.buffer
+            sys.stdout.buffer.flush()
+        elif stat.S_ISREG(_mode(path) or stat.S_IFREG):
+            with _moved_when_done(_target(path)) as file:
+                yield file
+        else:
+            with Path(path).open("wb") as file:
+                yield file
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _refuse_os_error("standard output" if str(path) in _STDOUT else str(path), error)
+
+
+def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = False) -> None:
+    """Write bytes to a file, or to standard output for `-`; whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If that is not possible.
+    """
+    with open_output(path, overwrite=overwrite) as file:
+        file.write(data)
+
+
+def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> None:
+    """Write text as UTF-8, line ends as given, to a file or to standard output for `-`; whole or not at all.
+
+    Raises
+    ------
+    OutputError
+        If that is not possible.
+    """
+    write_bytes(path, text.encode("utf-8"), overwrite=overwrite)
+
+
+@contextmanager
+def _moved_when_done(target: Path) -> Iterator[BinaryIO]:
+    temporary = target.with_name(f".cylx-{secrets.token_hex(8)}.tmp")
+    try:
+        with temporary.open("xb") as file:
+            yield file
+        temporary.replace(target)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+
+
+def _target(path: str | Path) -> Path:
+    return Path(os.path.realpath(path))
+
+
+def _mode(path: str | Path) -> int | None:
+    """Give the type and permissions of what the path leads to, None if there is nothing yet."""
+    try:
+        return Path(path).stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except (OSError, ValueError) as error:
+        _refuse_os_error(str(path), error)
+
+
+def _check_folder(folder: Path, place: str) -> None:
+    if not folder.exists():
+        raise OutputError(place, f"the folder {str(folder)!r} does not exist", "create it first")
+    if not folder.is_dir():
+        raise OutputError(place, f"{str(folder)!r} is not a folder", "choose another folder")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(place, f"the folder {str(folder)!r} is read-only", "choose another folder")
+
+
+def _refuse_os_error(place: str, error: OSError | ValueError) -> NoReturn:
+    fault = getattr(error, "strerror", None) or str(error)
+    full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
+    remedy = "free some space, or choose another folder" if full else "choose another path"
+    raise OutputError(place, f"cannot be written: {fault[:1].lower() + fault[1:]}", remedy) from error

@@ -1,0 +1,276 @@
+"""PCD: all fields of all points, in the order of the file.
+
+The header and the bodies `ascii` and `binary` are read here and not by open3d, which takes words for zeros, makes up
+the points that a short body lacks, and loses fields that it has no use for. open3d unpacks `binary_compressed`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, BinaryIO
+
+import numpy as np
+
+from cylx.errors import InputError
+from cylx.io.inputs import Input, excerpt
+from cylx.io.names import coordinate_names, mended_names, missing_coordinates
+from cylx.io.open3d_door import unpack_columns
+from cylx.io.rows import RowFormat, read_rows, short_of_points
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+_TYPES = {
+    **{("F", size): f"<f{size}" for size in (4, 8)},
+    **{(kind, size): f"<{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)},
+}
+_KEYS = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
+_BODIES = ("ascii", "binary", "binary_compressed")
+_MOST_HEADER = 1 << 20
+_MOST_EXPANSION = 100  # LZF makes at most 264 bytes of 3
+_MOST_COLUMNS = 1 << 12
+_REMEDY = "export the file again as PCD 0.7"
+_SUFFIX_REMEDY = "give it its right suffix"
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    """A field of a point: `count` values of a type, the first of them at byte `offset`."""
+
+    name: str
+    type: str
+    count: int
+    offset: int
+
+    @property
+    def width(self) -> int:
+        return self.count * int(self.type[2:])
+
+    @property
+    def padding(self) -> bool:
+        return self.name == "_"
+
+    def names(self) -> list[str]:
+        """Name the values."""
+        return [self.name] if self.count == 1 else [f"{self.name}_{place}" for place in range(self.count)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    """What a header says, and where it ends, in bytes and lines."""
+
+    fields: list[_Field]
+    points: int
+    body: str
+    size: int
+    lines: int
+
+    @property
+    def width(self) -> int:
+        """Bytes a point."""
+        return sum(field.width for field in self.fields)
+
+    def columns(self) -> list[tuple[str, str, _Field, int]]:
+        """Give the name, type and field of each value of a point, and its place in the field, padding left out."""
+        kept = [
+            (name, field, place)
+            for field in self.fields
+            if not field.padding
+            for place, name in enumerate(field.names())
+        ]
+        names = mended_names([name for name, _, _ in kept])
+        return [(name, field.type, field, place) for name, (_, field, place) in zip(names, kept, strict=True)]
+
+
+def read_pcd(source: Input) -> NDArray[np.void]:
+    """Read all points of a PCD file, the NaN points of organised clouds as well.
+
+    Parameters
+    ----------
+    source : Input
+
+    Returns
+    -------
+    ndarray of shape (points,), structured
+        All fields but padding (`_`), a field `f` of several values as `f_0`, `f_1` and so on, those of `DATA binary`
+        mapped from the file. Coordinates in ascii are float64 whatever the header says: the text may hold more digits.
+
+    Raises
+    ------
+    InputError
+        If this is no PCD, has no x, y and z, or is shorter than its header says, or damaged.
+    """
+    header = _read_header(source)
+    if header.body == "ascii":
+        return _read_text(header, source)
+    if header.body == "binary":
+        return _read_mapped(header, source)
+    return _read_packed(header, source)
+
+
+def write_pcd(file: BinaryIO, table: NDArray[np.void]) -> None:
+    """Write points as PCD 0.7 with a binary body.
+
+    Parameters
+    ----------
+    file : binary file
+    table : ndarray of shape (points,), structured
+        Integers and floats of 4 and 8 bytes.
+    """
+    packed = np.dtype([(name, table.dtype[name].newbyteorder("<")) for name in table.dtype.names or ()])
+    kinds = [packed[name] for name in packed.names or ()]
+    header = {
+        "VERSION": ["0.7"],
+        "FIELDS": packed.names or (),
+        "SIZE": [kind.itemsize for kind in kinds],
+        "TYPE": [kind.kind.upper() for kind in kinds],
+        "COUNT": [1] * len(kinds),
+        "WIDTH": [len(table)],
+        "HEIGHT": [1],
+        "VIEWPOINT": [0, 0, 0, 1, 0, 0, 0],
+        "POINTS": [len(table)],
+        "DATA": ["binary"],
+    }
+    lines = [f"{key} {' '.join(map(str, values))}\n" for key, values in header.items()]
+    file.write("".join(["# .PCD v0.7 - Point Cloud Data file format\n", *lines]).encode())
+    file.write(table.astype(packed).tobytes())
+
+
+def _read_mapped(header: _Header, source: Input) -> NDArray[np.void]:
+    held = (source.size - header.size) // header.width
+    if held < header.points:
+        raise short_of_points(source.place, header.points, held)
+    columns = header.columns()
+    dtype = np.dtype(
+        {
+            "names": [name for name, _, _, _ in columns],
+            "formats": [kind for _, kind, _, _ in columns],
+            "offsets": [field.offset + place * int(kind[2:]) for _, kind, field, place in columns],
+            "itemsize": header.width,
+        }
+    )
+    return np.asarray(np.memmap(source.file, dtype, "c", header.size, (header.points,)))
+
+
+def _read_text(header: _Header, source: Input) -> NDArray[np.void]:
+    """Read rows of text; padding is read like any other value, and left."""
+    kept = [(name, kind) for name, kind, _, _ in header.columns()]
+    exact = coordinate_names([name for name, _ in kept])
+    wanted = iter([(name, "f8" if kind == "<f4" and name in exact else kind) for name, kind in kept])
+    every = [
+        (f" {field.offset + place}", "f8") if field.padding else next(wanted)
+        for field in header.fields
+        for place in range(field.count)
+    ]
+    rows = RowFormat(np.dtype(every), header.size, header.lines + 1, count=header.points, commented=True)
+    return read_rows(source, rows)[[name for name, _ in kept]]
+
+
+def _read_packed(header: _Header, source: Input) -> NDArray[np.void]:
+    source.file.seek(header.size)
+    body = source.file.read()
+    sizes = np.frombuffer(body[:8].ljust(8, b"\0"), "<u4").tolist()
+    if sizes[0] > len(body) - 8 or len(body) < 8:
+        fault = f"the body should have {sizes[0]} bytes, the file holds {max(len(body) - 8, 0)}"
+        raise InputError(source.place, fault, "get a complete copy of the file")
+    if sizes[1] != header.points * header.width or sizes[1] > _MOST_EXPANSION * sizes[0]:
+        fault = f"the body does not hold the {header.points} points that the header promises"
+        raise InputError(source.place, fault, "get a complete copy of the file")
+    try:
+        flat = unpack_columns(body, header.points, header.width)
+    except ImportError:
+        remedy = "install open3d, or save the file as DATA binary"
+        raise InputError(source.place, "DATA binary_compressed needs open3d", remedy) from None
+    if flat is None:
+        raise InputError(source.place, "the compressed body is damaged", "get a complete copy of the file")
+    columns = header.columns()
+    table = np.empty(header.points, np.dtype([(name, kind) for name, kind, _, _ in columns]))
+    for name, kind, field, place in columns:
+        start, width = header.points * field.offset, header.points * field.width
+        table[name] = flat[start : start + width].view(kind).reshape(header.points, field.count)[:, place]
+    return table
+
+
+def _read_header(source: Input) -> _Header:
+    """Read the lines up to DATA and check them against each other."""
+    head = source.head(_MOST_HEADER)
+    said: dict[str, list[str]] = {}
+    start = number = 0
+    while "DATA" not in said:
+        stop = head.find(b"\n", start)
+        if stop < 0:
+            raise _unfinished(source, said)
+        number += 1
+        words = head[start:stop].decode("utf-8", "backslashreplace").partition("#")[0].split()
+        start = stop + 1
+        if not words:
+            continue
+        key = "FIELDS" if words[0] == "COLUMNS" else words[0]
+        if key not in _KEYS:
+            if not said:
+                raise InputError(source.place, "is no PCD: it does not begin with its header", _SUFFIX_REMEDY)
+            fault = f"{excerpt(' '.join(words))} is no line of a PCD header"
+            raise InputError(f"{source.place}:{number}", fault, _REMEDY)
+        said[key] = words[1:]
+    body = " ".join(said["DATA"])
+    if body not in _BODIES:
+        raise InputError(
+            f"{source.place}:{number}", f"unknown DATA {excerpt(body)}", f"use one of {', '.join(_BODIES)}"
+        )
+    return _Header(_fields(said, source.place), _points(said, source.place), body, start, number)
+
+
+def _unfinished(source: Input, said: dict[str, list[str]]) -> InputError:
+    if not said:
+        return InputError(source.place, "is no PCD: it does not begin with its header", _SUFFIX_REMEDY)
+    if source.size > _MOST_HEADER:
+        return InputError(source.place, "the PCD header has no end", _REMEDY)
+    return InputError(source.place, "the file ends within the PCD header", "get a complete copy of the file")
+
+
+def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
+    names = said.get("FIELDS", [])
+    missing = missing_coordinates(names)
+    if missing:
+        raise InputError(place, f"FIELDS has no {missing}", "give a PCD with x, y and z")
+    kinds = said.get("TYPE", [])
+    sizes = _numbers(said, "SIZE", place)
+    counts = _numbers(said, "COUNT", place) if "COUNT" in said else [1] * len(names)
+    for key, values in (("SIZE", sizes), ("TYPE", kinds), ("COUNT", counts)):
+        if len(values) != len(names):
+            raise InputError(place, f"{len(names)} FIELDS, but {key} has {len(values)}", _REMEDY)
+    if sum(counts) > _MOST_COLUMNS:
+        raise InputError(place, f"expected at most {_MOST_COLUMNS} values a point, found {sum(counts)}", _REMEDY)
+    fields: list[_Field] = []
+    offset = 0
+    for name, kind, size, count in zip(names, kinds, sizes, counts, strict=True):
+        if (kind.upper(), size) not in _TYPES:
+            raise InputError(
+                place, f"field {excerpt(name)} has the unknown type {excerpt(kind)} of size {size}", _REMEDY
+            )
+        if name in coordinate_names(names) and count != 1:
+            raise InputError(place, f"field {name} has {count} values", "give a PCD with one x, y and z a point")
+        fields.append(_Field(name, _TYPES[kind.upper(), size], count, offset))
+        offset += fields[-1].width
+    return fields
+
+
+def _points(said: dict[str, list[str]], place: str) -> int:
+    counts = [_numbers(said, key, place) for key in ("WIDTH", "HEIGHT", "POINTS") if key in said]
+    if any(len(count) != 1 for count in counts) or not ("POINTS" in said or len(counts) == 2):
+        raise InputError(place, "the PCD header does not say how many POINTS there are", _REMEDY)
+    *grid, last = (count[0] for count in counts)
+    points = last if "POINTS" in said else grid[0] * last
+    if len(grid) == 2 and grid[0] * grid[1] != points:
+        raise InputError(place, f"WIDTH x HEIGHT is {grid[0] * grid[1]}, but POINTS is {points}", _REMEDY)
+    if points == 0:
+        raise InputError(place, "holds no points", "give a file with points")
+    return points
+
+
+def _numbers(said: dict[str, list[str]], key: str, place: str) -> list[int]:
+    words = said.get(key, [])
+    for word in words:
+        if not (word.isascii() and word.isdecimal() and len(word) < 19):
+            raise InputError(place, f"{key} is {excerpt(' '.join(words))}, not made of counts", _REMEDY)
+    return [int(word) for word in words]

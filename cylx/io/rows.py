@@ -1,0 +1,201 @@
+"""Rows of numbers in text, as XYZ files, ascii PLY and ascii PCD hold them."""
+
+from __future__ import annotations
+
+import io
+import warnings
+from contextlib import contextmanager
+from dataclasses import dataclass
+from itertools import islice
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cylx.errors import InputError
+from cylx.io.inputs import Input, excerpt
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from numpy.typing import NDArray
+
+COMMENTS = ("#", "//")
+
+
+@dataclass(frozen=True, slots=True)
+class RowFormat:
+    """How the rows are written, and where they are.
+
+    Parameters
+    ----------
+    dtype : dtype
+        Structured: one scalar field a column.
+    offset : int
+        Byte at which the text begins.
+    line : int
+        Number of that line in the file, from 1.
+    skip : int
+        Lines to skip from there.
+    count : int or None
+        Rows to read; None for all there are.
+    delimiter : str or None
+        What stands between columns; None for white space.
+    commented : bool
+        Whether `#` and `//` begin a comment.
+    """
+
+    dtype: np.dtype[np.void]
+    offset: int = 0
+    line: int = 1
+    skip: int = 0
+    count: int | None = None
+    delimiter: str | None = None
+    commented: bool = False
+
+
+def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
+    """Read rows of numbers.
+
+    Parameters
+    ----------
+    source : Input
+    rows : RowFormat
+
+    Returns
+    -------
+    ndarray of shape (rows,), structured
+
+    Raises
+    ------
+    InputError
+        If a row has too few or too many columns, or something that is no number of the column's type; or if there are
+        fewer rows than `rows.count`.
+    """
+    _check_room(source, rows)
+    try:
+        with text_lines(source, rows.offset) as lines:
+            table = _load(lines, rows, rows.delimiter)
+    except ValueError:  # what is wrong, and in which line, takes a slower look; if nothing is, the rows come with it
+        with text_lines(source, rows.offset) as lines:
+            table = _load(_checked(lines, rows, source.place), rows, None)
+    if rows.count is not None and len(table) < rows.count:
+        raise short_of_points(source.place, rows.count, len(table))
+    return table
+
+
+def short_of_points(place: str, promised: int, found: int, *, at_most: bool = False) -> InputError:
+    """Make the error of a file whose body is shorter than its header says."""
+    held = f"at most {found}" if at_most else f"{found}"
+    return InputError(
+        place, f"the header promises {promised} points, the file holds {held}", "get a complete copy of the file"
+    )
+
+
+@contextmanager
+def text_lines(source: Input, offset: int = 0) -> Iterator[io.TextIOWrapper]:
+    """Give the lines of a text from a byte on, with any line ends; bytes that are not UTF-8 come spelled out."""
+    source.file.seek(offset)
+    lines = io.TextIOWrapper(source.file, encoding="utf-8-sig", errors="backslashreplace")
+    try:
+        yield lines
+    finally:
+        lines.detach()
+
+
+def uncommented(line: str) -> str:
+    """Cut a comment off a line, and the white space about the rest.
+
+    Examples
+    --------
+    >>> uncommented(" 1 2 3  // the corner")
+    '1 2 3'
+    """
+    for mark in COMMENTS:
+        line = line.partition(mark)[0]
+    return line.strip()
+
+
+def split_row(line: str, delimiter: str | None) -> list[str]:
+    """Split a row into its columns; a delimiter at the end of the row is none.
+
+    Examples
+    --------
+    >>> split_row("1; 2;3;", ";")
+    ['1', '2', '3']
+    """
+    if delimiter is None:
+        return line.split()
+    columns = [column.strip() for column in line.split(delimiter)]
+    return columns[:-1] if columns[-1] == "" else columns
+
+
+def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
+    """Tell whether a column can be read as a number, and held by a type.
+
+    Examples
+    --------
+    >>> is_number("-1.5e3"), is_number("1_000"), is_number("256", np.dtype("u1"))
+    (True, False, False)
+    """
+    if "_" in text or not text.isascii():
+        return False
+    try:
+        if dtype is None or dtype.kind == "f":
+            float(text)
+            return True
+        limits = np.iinfo(dtype)
+        return limits.min <= int(text) <= limits.max
+    except ValueError:
+        return False
+
+
+def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None) -> NDArray[np.void]:
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        warnings.simplefilter("ignore")  # of empty lines and of an empty file, which is dealt with here
+        return np.loadtxt(
+            lines,
+            dtype=rows.dtype,
+            comments=COMMENTS if rows.commented else None,
+            delimiter=delimiter,
+            skiprows=rows.skip,
+            max_rows=rows.count,
+            ndmin=1,
+        )
+
+
+def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]:
+    """Give the lines with one space between columns, until one of them is wrong."""
+    names = rows.dtype.names or ()
+    yield from ("\n" for _ in range(rows.skip))
+    for number, line in enumerate(islice(lines, rows.skip, None), rows.line + rows.skip):
+        columns = split_row(uncommented(line) if rows.commented else line.strip(), rows.delimiter)
+        if not columns:
+            continue
+        if len(columns) != len(names):
+            fault = f"expected {len(names)} columns, found {len(columns)}"
+            raise InputError(f"{place}:{number}", fault, "give every row the same columns")
+        for name, column in zip(names, columns, strict=True):
+            check_number(f"{place}:{number}", name, column, rows.dtype[name])
+        yield " ".join(columns)
+
+
+def check_number(where: str, name: str, column: str, dtype: np.dtype[Any] | None = None) -> None:
+    """Refuse a column that is not a number.
+
+    Raises
+    ------
+    InputError
+        If it is not.
+    """
+    if not is_number(column, dtype):
+        kind = "a number" if dtype is None or dtype.kind == "f" else f"a number of type {dtype.name}"
+        fault = f"{name} is {excerpt(column)}, not {kind}" if column else f"{name} is empty"
+        raise InputError(where, fault, "write numbers like -1.5 or 2e-3")
+
+
+def _check_room(source: Input, rows: RowFormat) -> None:
+    """Refuse a count of rows that could not fit into the file: a column takes a digit and what ends it."""
+    least = 2 * len(rows.dtype.names or ())
+    room = (source.size - rows.offset - 2 * rows.skip + 1) // least
+    if rows.count is not None and rows.count > room:
+        raise short_of_points(source.place, rows.count, max(room, 0), at_most=True)
