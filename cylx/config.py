@@ -164,6 +164,8 @@ class VerificationConfig(Section):
     """Largest change of the radius along the axis: tells a cylinder from a cone."""
     max_bulge: Number | None = 0.15
     """Largest curvature along the axis times the radius: tells a cylinder from a sphere, which has 1."""
+    min_agreement: Share | None = 0.6
+    """Smallest share of the curvature windows along the cylinder that agree with it, give or take a standard error."""
 
 
 class Config(Section):
@@ -203,6 +205,7 @@ def load_config(
     preset: str | None = None,
     overrides: Sequence[str] = (),
     options: Mapping[str, object] | None = None,
+    start: Config | None = None,
 ) -> Config:
     """Put a configuration together: defaults < preset < YAML file < overrides < named options.
 
@@ -216,6 +219,8 @@ def load_config(
         Each `section.key=value`, the value written as in YAML; a later one wins.
     options : mapping of str to object, optional
         Values by dotted key.
+    start : Config, optional
+        What to change, instead of the defaults.
 
     Raises
     ------
@@ -227,7 +232,8 @@ def load_config(
     >>> load_config(preset="paper", overrides=["slicing.planes=20"]).slicing.planes
     20
     """
-    given = [_without_empty_sections(file_layer(path))] if path is not None else []
+    given = [Layer("", start.model_dump())] if start is not None else []
+    given += [_without_empty_sections(file_layer(path))] if path is not None else []
     given += [override_layer(text) for text in overrides]
     given += [Layer("", nested(key, value)) for key, value in (options or {}).items()]
     given += [Layer("", {"preset": preset})] if preset is not None else []
@@ -238,6 +244,38 @@ def load_config(
     for layer in given:
         merged = merge(merged, layer.values)
     return _validate(merged, given)
+
+
+def named_options(
+    *,
+    seed: int | None = None,
+    radius: tuple[float | None, float | None] | None = None,
+    max_cylinders: int | None = None,
+    planes: int | None = None,
+) -> dict[str, object]:
+    """Give the dotted keys that the named options of the command line and of `cylx.extract` stand for.
+
+    Parameters
+    ----------
+    seed, max_cylinders, planes : int, optional
+        As in the configuration.
+    radius : pair of float or None, optional
+        Smallest and largest radius, scene units; None leaves a side to the configuration.
+
+    Returns
+    -------
+    dict
+        The options that were given, for `load_config`.
+    """
+    smallest, largest = radius or (None, None)
+    values = {
+        "seed": seed,
+        "max_cylinders": max_cylinders,
+        "slicing.planes": planes,
+        "scene.radius_min": smallest,
+        "scene.radius_max": largest,
+    }
+    return {key: value for key, value in values.items() if value is not None}
 
 
 def preset_names() -> tuple[str, ...]:

@@ -76,7 +76,8 @@ def _suggest_key(path: tuple[str, ...], model: type[BaseModel]) -> str:
     """Name the key that was probably meant, in the same section or in another one."""
     keys = list(dotted_keys(model))
     if path[-1] in keys:
-        return f"write '{path[-1].replace('.', ':')}' on two lines, the key indented below its section"
+        above, _, key = path[-1].rpartition(".")
+        return f"write '{key}' below '{above}:', indented"
     section = "".join(f"{part}." for part in path[:-1])
     siblings = [key.removeprefix(section) for key in keys if key.startswith(section)]
     siblings = [key for key in siblings if "." not in key]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from cylx.errors import ConfigError
 from cylx.strict_yaml import parse_yaml
 
-_MOST_BYTES = 1_000_000
+_MOST_BYTES = 100_000
 
 
 class Layer(NamedTuple):
@@ -47,7 +47,7 @@ def file_layer(path: str | Path) -> Layer:
         fault = getattr(error, "strerror", None) or str(error)
         raise ConfigError(str(path), f"cannot be read: {fault}", "give a readable YAML file") from None
     if len(content) > _MOST_BYTES:
-        raise ConfigError(str(path), "is larger than 1 MB", "give a YAML file")
+        raise ConfigError(str(path), "is larger than 100 kB", "give a YAML file")
     return Layer(f"{path}: ", _mapping(parse_yaml(text, str(path)), str(path)))
 
 

@@ -13,6 +13,7 @@ import yaml
 from cylx.errors import ConfigError
 
 _MOST_DIGITS = 300
+_MOST_DEPTH = 20
 _INTEGER = re.compile(rf"[-+]?[0-9]{{1,{_MOST_DIGITS}}}$")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?$")
 _WORDS: dict[str, bool | None] = {"": None, "~": None, "null": None, "true": True, "false": False}
@@ -36,7 +37,7 @@ def parse_yaml(text: str, place: str) -> object:
     Raises
     ------
     ConfigError
-        If the text is not YAML, or uses tags, anchors, aliases or a key twice.
+        If the text is not YAML, or uses tags, anchors, aliases, a key twice or deep nesting.
 
     Examples
     --------
@@ -56,12 +57,11 @@ def parse_yaml(text: str, place: str) -> object:
     except yaml.reader.ReaderError as error:
         fault = f"holds the character #x{error.character:04x}" if isinstance(error.character, int) else "is not text"
         raise ConfigError(place, fault, "give a YAML text file") from None
-    except RecursionError:
-        raise ConfigError(place, "is nested too deeply", "a configuration has two levels") from None
 
 
 def _refuse_anchors_and_tags(text: str, place: str) -> None:
-    """Stop at the first anchor, alias or tag, before anything is composed of it."""
+    """Stop at the first anchor, alias, tag or deep nesting, before anything is composed of it."""
+    depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         line = _line(place, event.start_mark)
         if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
@@ -69,6 +69,9 @@ def _refuse_anchors_and_tags(text: str, place: str) -> None:
         tag = getattr(event, "tag", None)
         if tag not in {None, "!"}:
             raise ConfigError(line, f"the tag {tag} is not allowed", "write a plain value")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _MOST_DEPTH:
+            raise ConfigError(line, "is nested too deeply", "a configuration has two levels")
 
 
 def _line(place: str, mark: object) -> str:

@@ -1,0 +1,91 @@
+"""The whole method in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cylx.config import Config, load_config, named_options
+from cylx.io import read_cloud
+from cylx.pipeline import extract_cylinders
+from cylx.records import Extraction, Observer, PointCloud, SilentObserver
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+
+def extract(
+    points_or_path: ArrayLike | PointCloud | str | PathLike[str],
+    *,
+    preset: str | None = None,
+    config: Config | str | PathLike[str] | None = None,
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    radius: tuple[float | None, float | None] | None = None,
+    max_cylinders: int | None = None,
+    planes: int | None = None,
+    threads: int | None = None,
+    observer: Observer | None = None,
+) -> Extraction:
+    """Find the cylinders of a point cloud; the same as `cylx extract`.
+
+    Parameters
+    ----------
+    points_or_path : array_like of shape (N, 3), PointCloud, str or Path
+        Coordinates in any unit, or a file that holds them.
+    preset : str, optional
+        `auto` or `paper`; by default the one of the configuration, or `auto`.
+    config : Config, str or Path, optional
+        The configuration, or a YAML file.
+    overrides : sequence of str
+        Each `section.key=value`, over the configuration.
+    seed : int, optional
+        Seed of everything random.
+    radius : pair of float or None, optional
+        Smallest and largest radius, in the unit of the points; None sets no limit.
+    max_cylinders : int, optional
+        Most cylinders extracted.
+    planes : int, optional
+        Number of planes through the whole cloud.
+    threads : int, optional
+        Number of threads; the result does not depend on it. By default one a core.
+    observer : Observer, optional
+        Told of the progress.
+
+    Returns
+    -------
+    Extraction
+
+    Raises
+    ------
+    ConfigError
+        If the settings have an unknown key, a wrong type or an impossible value.
+    InputError
+        If the file cannot be read, or the cloud holds nothing that could be worked on.
+    ValueError
+        If the array has not the shape (N, 3).
+
+    Examples
+    --------
+    >>> import cylx, cylx.synthetic
+    >>> pipe = cylx.synthetic.single(points=2000, seed=1)
+    >>> found = cylx.extract(pipe.points)
+    >>> [round(fit.cylinder.radius, 1) for fit in found.cylinders]
+    [1.0]
+    """
+    settings = load_config(
+        path=None if config is None or isinstance(config, Config) else Path(config),
+        start=config if isinstance(config, Config) else None,
+        preset=preset,
+        overrides=overrides,
+        options=named_options(seed=seed, radius=radius, max_cylinders=max_cylinders, planes=planes),
+    )
+    if isinstance(points_or_path, PointCloud):
+        cloud = points_or_path
+    elif isinstance(points_or_path, str | PathLike):
+        cloud = read_cloud(Path(points_or_path))
+    else:
+        cloud = PointCloud.from_array(points_or_path)
+    return extract_cylinders(cloud, settings, threads=threads, observer=observer or SilentObserver())

@@ -1,0 +1,34 @@
+"""What the user types and sees: one file a command.
+
+Nothing heavy is imported until a command needs it, so that `cylx --help` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+import click
+
+from cylx import __version__
+from cylx.cli.group import LazyGroup
+
+
+@click.group(
+    cls=LazyGroup,
+    homes={
+        "extract": "cylx.cli.extract",
+        "info": "cylx.cli.info",
+        "config": "cylx.cli.config",
+        "synth": "cylx.cli.synth",
+        "evaluate": "cylx.cli.evaluate",
+        "diff": "cylx.cli.diff",
+    },
+    examples=["cylx extract scan.ply", "cylx extract scan.ply -o - | jq '.cylinders | length'"],
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+)
+@click.version_option(__version__, prog_name="cylx", message="%(prog)s %(version)s")
+def main() -> None:
+    """Find every cylinder in a point cloud that has no normals.
+
+    Exit codes: 0 done; 1 a difference was found, or a bug; 2 usage or configuration; 3 unreadable or unusable input; 4
+    output could not be written; 5 fewer cylinders than --require; 6 some of several inputs failed; 130 interrupted; 141
+    the reader of a pipe went away.
+    """

@@ -1,0 +1,81 @@
+"""`cylx config`: write, show and check configurations, and publish the schemas."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from cylx.cli.failures import answer
+from cylx.cli.group import ExampleGroup
+from cylx.cli.options import PRESETS, configured, debug_option, json_option, overwrite_option
+
+if TYPE_CHECKING:
+    from cylx.config import Config
+
+
+@click.group(cls=ExampleGroup, examples=["cylx config init my.yaml", "cylx config check my.yaml"])
+def config() -> None:
+    """Write, show and check configurations."""
+
+
+@config.command(examples=["cylx config init my.yaml", "cylx config init - --preset paper"])
+@click.argument("file", default="cylx.yaml")
+@click.option("--preset", type=click.Choice(PRESETS), default="auto", show_default=True, help="Values to write.")
+@overwrite_option
+@debug_option
+def init(*, file: str, preset: str, overwrite: bool) -> None:
+    """Write a configuration with every key, its value and its meaning.
+
+    FILE is cylx.yaml if not given, - for standard output. Change what you like, leave out the rest, and give it to
+    'cylx extract -c FILE'.
+    """
+    from cylx.config import load_config
+    from cylx.config_text import commented_yaml
+    from cylx.io import write_text
+
+    write_text(file, commented_yaml(load_config(preset=preset)), overwrite=overwrite)
+
+
+@config.command(examples=["cylx config show --preset paper", "cylx config show -c my.yaml --set slicing.planes=80"])
+@configured
+@json_option
+@debug_option
+def show(*, settings: Config, as_json: bool) -> None:
+    """Show the configuration that these options amount to.
+
+    What is null is read off the cloud; the JSON that 'cylx extract' writes has the values.
+    """
+    from cylx.config_text import plain_yaml
+
+    answer(json.dumps(settings.model_dump(mode="json"), indent=2) + "\n" if as_json else plain_yaml(settings))
+
+
+@config.command(examples=["cylx config check my.yaml", "cylx config check my.yaml && cylx extract scan.ply -c my.yaml"])
+@click.argument("file")
+@debug_option
+def check(*, file: str) -> None:
+    """Say whether a configuration is valid, and what is wrong with it if not."""
+    from cylx.config import load_config
+
+    answer(f"{file}: valid, preset {load_config(path=file).preset}\n")
+
+
+@config.command(examples=["cylx config schema > cylx.schema.json", "cylx config schema --result"])
+@click.option("--result", is_flag=True, help="The schema of NAME.cylinders.json instead.")
+@debug_option
+def schema(*, result: bool) -> None:
+    """Print the JSON schema of the configuration, or of the result.
+
+    Editors that know the schema complete and check the YAML while it is written.
+    """
+    if result:
+        from cylx.results import result_schema
+
+        document = result_schema()
+    else:
+        from cylx.config import Config
+
+        document = Config.model_json_schema()
+    answer(json.dumps(document, indent=2) + "\n")

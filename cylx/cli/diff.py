@@ -1,0 +1,67 @@
+"""`cylx diff`: whether two results are the same cylinders."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import click
+
+from cylx.cli.documents import called_by_file
+from cylx.cli.failures import answer
+from cylx.cli.group import ExampleCommand
+from cylx.cli.options import debug_option, json_option
+
+if TYPE_CHECKING:
+    from cylx.evaluation import Difference
+
+_TOLERANCE = click.FloatRange(min=0)
+
+
+@click.command(
+    cls=ExampleCommand,
+    examples=[
+        "cylx diff golden/room.cylinders.json room.cylinders.json",
+        "cylx diff before.json after.json --radius 0.001 --json",
+    ],
+)
+@click.argument("a")
+@click.argument("b")
+@click.option(
+    "--angle", "angle_deg", type=_TOLERANCE, default=0.1, show_default=True, help="Between the axes, degrees."
+)
+@click.option("--offset", type=_TOLERANCE, default=0.01, show_default=True, help="Between the axes, in radii.")
+@click.option("--radius", type=_TOLERANCE, default=0.005, show_default=True, help="Of the radius, relative.")
+@click.option("--height", type=_TOLERANCE, default=0.05, show_default=True, help="Of length and place, relative.")
+@click.option("--inliers", type=_TOLERANCE, default=0.05, show_default=True, help="Of the inliers, relative.")
+@json_option
+@debug_option
+def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
+    """Say whether the results A and B are the same cylinders within tolerances.
+
+    The order of the cylinders does not matter. The exit code is 0 if they are the same and 1 if not; what differs is
+    shown.
+    """
+    from cylx.cli.display import show_table
+    from cylx.evaluation import Tolerances, compare
+    from cylx.io import read_json
+
+    documents = read_json(a), read_json(b)
+    with called_by_file({"a": a, "b": b}):
+        comparison = compare(*documents, tolerances=Tolerances(**tolerances))
+    if as_json:
+        answer(json.dumps(comparison.to_dict(), indent=2) + "\n")
+    elif comparison.differences:
+        header = ["what", "id in A", "id in B", "of", "A", "B", "difference", "tolerance"]
+        show_table(header, [_row(difference) for difference in comparison.differences])
+    else:
+        answer(f"the same {comparison.matched} cylinder{'' if comparison.matched == 1 else 's'}\n")
+    if not comparison.same:
+        raise click.exceptions.Exit(1)
+
+
+def _row(difference: Difference) -> list[str]:
+    """Write one line of the table."""
+    ids = ["" if number is None else str(number) for number in (difference.id_a, difference.id_b)]
+    values = (difference.a, difference.b, difference.difference, difference.tolerance)
+    return [difference.kind, *ids, difference.what, *("" if v is None else f"{v:.6g}" for v in values)]

@@ -1,0 +1,198 @@
+"""What is shown on the way and at the end: the only room with rich."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from cylx.cli.failures import answer, tell
+from cylx.records import Observer, SilentObserver
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.progress import Progress, TaskID
+
+    from cylx.cli.outputs import Job
+    from cylx.records import CylinderFit, Extraction
+
+_MOST_ROWS = 20
+_WIDE_ENOUGH = 200
+_COMPILING = "compiling (the first time only)"
+
+
+class Conversation:
+    """All that a command says on standard error, apart from errors.
+
+    Parameters
+    ----------
+    quiet : bool
+        Say nothing.
+    verbose : bool
+        Say more.
+    """
+
+    def __init__(self, *, quiet: bool = False, verbose: bool = False) -> None:
+        self.quiet = quiet
+        self.verbose = verbose
+
+    def say(self, line: str) -> None:
+        """Say a line, unless quiet."""
+        if not self.quiet:
+            tell(line)
+
+    @contextmanager
+    def progress(self) -> Iterator[Observer]:
+        """Give an observer that shows how far the stages are, where somebody can see it."""
+        if self.quiet or not sys.stderr.isatty():
+            yield SilentObserver()
+            return
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        with Progress(*columns, TimeElapsedColumn(), console=_console(sys.stderr), transient=True) as display:
+            yield ProgressObserver(display)
+
+    def report(self, job: Job, extraction: Extraction) -> None:
+        """Say what was found in a scan and where it was written."""
+        if self.quiet:
+            return
+        fits = extraction.cylinders
+        written = [name for name in job.outputs if name != "-"]
+        scan = "standard input" if job.scan == "-" else job.scan
+        count = f"{len(fits)} cylinder{'' if len(fits) == 1 else 's'}"
+        tell(f"{scan}: {count}" + (f", written to {' and '.join(written)}" if written else ""))
+        for warning in extraction.warnings:
+            tell(f"warning: {warning}")
+        if self.verbose:
+            scene = extraction.scene
+            tell(f"spacing {scene.spacing:.4g}, noise {scene.noise:.4g}, extent {scene.extent:.4g}")
+            show_table(["stage", "considered", "kept", "rejected"], _stage_rows(extraction), err=True)
+        if fits:
+            shown = fits if self.verbose else fits[:_MOST_ROWS]
+            show_table(_CYLINDER_HEADER, [_cylinder_row(i, fit) for i, fit in enumerate(shown)], err=True)
+            if len(shown) < len(fits):
+                tell(f"… and {len(fits) - len(shown)} more; -v shows them all")
+
+
+class ProgressObserver:
+    """An observer that keeps one line of a rich display up to date.
+
+    Parameters
+    ----------
+    display : rich.progress.Progress
+        Where the line is.
+    """
+
+    def __init__(self, display: Progress) -> None:
+        self.display = display
+        self.task: TaskID | None = None
+
+    def stage_started(self, name: str, total: int | None) -> None:
+        """Show a stage in the place of the one before."""
+        if self.task is not None:
+            self.display.remove_task(self.task)
+        self.task = self.display.add_task(_COMPILING if name == "compiling" else name, total=total)
+
+    def stage_advanced(self, steps: int) -> None:
+        """Move the bar."""
+        if self.task is not None:
+            self.display.advance(self.task, steps)
+
+    def stage_finished(self, name: str, seconds: float) -> None:
+        """Leave the line until the next stage starts."""
+
+
+class Observers:
+    """Several observers who are told the same.
+
+    Parameters
+    ----------
+    *observers : Observer
+        Who is told.
+    """
+
+    def __init__(self, *observers: Observer) -> None:
+        self.observers = observers
+
+    def stage_started(self, name: str, total: int | None) -> None:
+        """Tell all."""
+        for observer in self.observers:
+            observer.stage_started(name, total)
+
+    def stage_advanced(self, steps: int) -> None:
+        """Tell all."""
+        for observer in self.observers:
+            observer.stage_advanced(steps)
+
+    def stage_finished(self, name: str, seconds: float) -> None:
+        """Tell all."""
+        for observer in self.observers:
+            observer.stage_finished(name, seconds)
+
+
+@contextmanager
+def observed(observer: Observer, name: str) -> Iterator[None]:
+    """Report a step of the command itself as a stage."""
+    started = perf_counter()
+    observer.stage_started(name, None)
+    yield
+    observer.stage_finished(name, perf_counter() - started)
+
+
+def show_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, err: bool = False) -> None:
+    """Show a table on standard output, or on standard error; numbers to the right."""
+    from rich import box
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=box.SIMPLE, pad_edge=False)
+    for i, name in enumerate(header):
+        numeric = bool(rows) and all(row[i][:1] in "+-.0123456789" for row in rows)
+        table.add_column(Text(name), justify="right" if numeric else "left", no_wrap=numeric)
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    console = _console(sys.stderr if err else sys.stdout)
+    with console.capture() as capture:
+        console.print(table)
+    text = capture.get().strip("\n")
+    if err:
+        tell(text)
+    else:
+        answer(text + "\n")
+
+
+def _console(stream: object) -> Console:
+    """Open a console on a stream; where nobody looks, lines are as wide as they have to be."""
+    from rich.console import Console
+
+    console = Console(file=stream, soft_wrap=False)  # type: ignore[arg-type]
+    if not console.is_terminal:
+        console.width = _WIDE_ENOUGH
+    return console
+
+
+_CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "payoff", "direction"]
+
+
+def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
+    """Write one line of the table of cylinders."""
+    shape = fit.cylinder
+    direction = " ".join(f"{x:.3f}" for x in shape.direction)
+    numbers = [f"{shape.radius:.5g}", f"{shape.height:.4g}", f"{fit.coverage * 57.29577951308232:.0f}°"]
+    return [str(index), *numbers, str(fit.inliers), f"{fit.rmse:.3g}", f"{fit.payoff:.2f}", direction]
+
+
+def _stage_rows(extraction: Extraction) -> list[list[str]]:
+    """Write the lines of the table of stages."""
+    return [
+        [
+            stage.name,
+            str(stage.considered),
+            str(stage.kept),
+            ", ".join(f"{reason} {count}" for reason, count in stage.rejected.items()),
+        ]
+        for stage in extraction.stages
+    ]

@@ -1,0 +1,120 @@
+"""`cylx evaluate`: how right a result is."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import click
+
+from cylx.cli.documents import called_by_file
+from cylx.cli.failures import answer, tell
+from cylx.cli.group import ExampleCommand
+from cylx.cli.options import debug_option, json_option
+
+if TYPE_CHECKING:
+    from cylx.evaluation import Evaluation
+
+_SHARE = click.FloatRange(0, 1)
+_ERROR = click.FloatRange(min=0)
+
+
+@click.command(
+    cls=ExampleCommand,
+    examples=[
+        "cylx evaluate room.cylinders.json room.truth.json",
+        "cylx evaluate room.cylinders.json room.truth.json --min-f1 0.99 --max-angle 0.1",
+    ],
+)
+@click.argument("result")
+@click.argument("truth")
+@click.option("--angle", "angle_deg", type=float, default=5.0, show_default=True, help="A match is closer, degrees.")
+@click.option("--offset", type=float, default=0.25, show_default=True, help="A match is closer, in radii.")
+@click.option("--radius", type=float, default=0.15, show_default=True, help="A match is closer, relative radius.")
+@click.option("--min-f1", type=_SHARE, metavar="BAR", help="Exit with 1 if F1 is below.")
+@click.option("--min-precision", type=_SHARE, metavar="BAR", help="Exit with 1 if the precision is below.")
+@click.option("--min-recall", type=_SHARE, metavar="BAR", help="Exit with 1 if the recall is below.")
+@click.option("--max-angle", type=_ERROR, metavar="BAR", help="Exit with 1 if any match is off by more, degrees.")
+@click.option("--max-offset", type=_ERROR, metavar="BAR", help="Exit with 1 if any match is off by more, in radii.")
+@click.option(
+    "--max-radius-error", type=_ERROR, metavar="BAR", help="Exit with 1 if any match is off by more, relative."
+)
+@json_option
+@debug_option
+def evaluate(
+    *, result: str, truth: str, angle_deg: float, offset: float, radius: float, as_json: bool, **bars: float | None
+) -> None:
+    """Compare the cylinders of RESULT with those of TRUTH.
+
+    Both are JSON files; 'cylx synth' writes the truth of its scenes. Cylinders are matched one to one where angle,
+    offset and radius are close. Without a bar the exit code is 0 whatever the result.
+    """
+    from cylx import evaluation
+    from cylx.io import read_json
+
+    documents = read_json(truth), read_json(result)
+    with called_by_file({"truth": truth, "result": result}):
+        outcome = evaluation.evaluate(*documents, angle_deg=angle_deg, offset=offset, radius=radius)
+    missed = list(missed_bars(outcome, bars))
+    if as_json:
+        answer(json.dumps({**outcome.to_dict(), "bars_missed": missed}, indent=2) + "\n")
+    else:
+        answer(as_text(outcome))
+    for line in missed:
+        tell(f"cylx: {line}")
+    if missed:
+        raise click.exceptions.Exit(1)
+
+
+def missed_bars(outcome: Evaluation, bars: Mapping[str, float | None]) -> Iterator[str]:
+    """Name the bars an evaluation does not reach; without any match, errors are not small but unknown.
+
+    Parameters
+    ----------
+    outcome : Evaluation
+        What was found out.
+    bars : mapping of str to float or None
+        `min_f1`, `min_precision`, `min_recall`, `max_angle`, `max_offset`, `max_radius_error`.
+    """
+    for name, value in (("f1", outcome.f1), ("precision", outcome.precision), ("recall", outcome.recall)):
+        bar = bars.get(f"min_{name}")
+        if bar is not None and value < bar:
+            yield f"{name} {value:.6g} is below --min-{name} {bar:g}"
+    errors = {"angle": outcome.angle_deg, "offset": outcome.offset, "radius-error": outcome.radius}
+    for name, spread in errors.items():
+        bar = bars.get(f"max_{name.replace('-', '_')}")
+        if bar is None:
+            continue
+        if spread is not None and spread.max > bar:
+            yield f"{name} {spread.max:.6g} is above --max-{name} {bar:g}"
+        elif spread is None and outcome.truth:
+            yield f"{name} is unknown, nothing was matched, and --max-{name} {bar:g} asks for it"
+
+
+def as_text(outcome: Evaluation) -> str:
+    """Write an evaluation for reading."""
+    counts = (
+        f"truth {outcome.truth}, found {outcome.predicted}, matched {outcome.matched}, duplicates {outcome.duplicates},"
+        f" ignored {outcome.ignored}"
+    )
+    lines = [
+        counts + (f", unusable {outcome.unusable}" if outcome.unusable else ""),
+        f"precision {outcome.precision:.4f}, recall {outcome.recall:.4f}, F1 {outcome.f1:.4f}",
+    ]
+    for name, unit, spread in (
+        ("angle", "°", outcome.angle_deg),
+        ("offset", " r", outcome.offset),
+        ("radius", " r", outcome.radius),
+    ):
+        if spread is not None:
+            values = (f"{label} {value:.3g}{unit}" for label, value in _statistics(spread))
+            lines.append(f"{name:<9} {', '.join(values)}")
+    lines += [f"missed    {', '.join(map(str, outcome.missed))}"] if outcome.missed else []
+    lines += [f"false     {', '.join(map(str, outcome.false))}"] if outcome.false else []
+    return "\n".join(lines) + "\n"
+
+
+def _statistics(spread: object) -> list[tuple[str, float]]:
+    """Name the statistics of an error."""
+    return [(name, getattr(spread, name)) for name in ("median", "mean", "max")]

@@ -1,0 +1,135 @@
+"""What becomes of a failure: one line on standard error and an exit code, and a traceback only with `--debug`."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import sys
+import traceback
+from types import TracebackType
+
+import click
+
+from cylx.errors import CylxError, OutputError
+
+DEBUG = "cylx.debug"  # key in the context's meta
+BUG, USAGE, UNUSABLE, INTERRUPTED, READER_GONE = 1, 2, 3, 130, 141
+
+_PASSED_ON = (click.exceptions.Exit, SystemExit, GeneratorExit)
+
+
+class Failures:
+    """Within it, a failure ends the program with one line and its exit code.
+
+    Parameters
+    ----------
+    context : click.Context, optional
+        Knows whether `--debug` was given.
+    """
+
+    def __init__(self, context: click.Context | None = None) -> None:
+        self.context = context
+
+    def __enter__(self) -> None:
+        """Watch for failures."""
+
+    def __exit__(
+        self, kind: type[BaseException] | None, failure: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        unwritten = flush_answer()
+        failure = failure or unwritten
+        if failure is None or isinstance(failure, _PASSED_ON):
+            return
+        if self.context is not None and self.context.meta.get(DEBUG):
+            tell("".join(traceback.format_exception(failure)).rstrip())
+        line, code = describe_failure(failure)
+        if line:
+            tell(line)
+        raise click.exceptions.Exit(code) from None
+
+
+def describe_failure(failure: BaseException) -> tuple[str, int]:
+    """Give the line and the exit code of a failure.
+
+    Parameters
+    ----------
+    failure : BaseException
+        What was raised.
+
+    Returns
+    -------
+    line : str
+        Empty if there is nothing to say.
+    code : int
+        The exit code.
+    """
+    if isinstance(failure, CylxError):
+        return _one_line(f"cylx: {failure}"), failure.exit_code
+    if isinstance(failure, click.ClickException):
+        return _usage_line(failure), USAGE
+    if isinstance(failure, BrokenPipeError):
+        return "", READER_GONE
+    if isinstance(failure, KeyboardInterrupt | click.Abort):
+        return "cylx: interrupted", INTERRUPTED
+    if isinstance(failure, MemoryError):
+        return "cylx: out of memory; thin the scan, or cut it into parts", UNUSABLE
+    what = _one_line(f"{type(failure).__name__}: {failure}")
+    return f"cylx: this is a bug of cylx: {what}; run it again with --debug for the traceback to report", BUG
+
+
+def tell(line: str) -> None:
+    """Say something on standard error; nobody listening is no failure."""
+    with contextlib.suppress(OSError):
+        click.echo(line, err=True)
+
+
+def answer(text: str) -> None:
+    """Write the answer, or a part of it, to standard output.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    BrokenPipeError
+        If the reader has gone.
+    """
+    if sys.stdout is None:
+        raise OutputError("standard output", "is closed", "open it, or write to a file")
+    try:
+        click.echo(text, nl=False)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise _unwritten(error) from error
+
+
+def flush_answer() -> BrokenPipeError | OutputError | None:
+    """Write what is still in the buffer of standard output, and return what went wrong."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError as error:
+        with contextlib.suppress(io.UnsupportedOperation):  # so that the interpreter does not fail on it once more
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return error if isinstance(error, BrokenPipeError) else _unwritten(error)
+    return None
+
+
+def _unwritten(error: OSError) -> OutputError:
+    """Say why standard output could not be written."""
+    return OutputError("standard output", f"cannot be written: {error.strerror}", "free some space, or write to a file")
+
+
+def _usage_line(failure: click.ClickException) -> str:
+    """Turn click's report of a usage error into one line."""
+    context = getattr(failure, "ctx", None)
+    if isinstance(failure, getattr(click.exceptions, "NoArgsIsHelpError", ())):
+        return failure.format_message()
+    see = f"; see '{context.command_path} --help'" if context is not None else ""
+    return _one_line(f"cylx: {failure.format_message().rstrip('.')}{see}")
+
+
+def _one_line(text: str) -> str:
+    """Join the lines of a text, and show what a terminal would not print."""
+    return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))

@@ -1,0 +1,92 @@
+"""Commands whose help leads with examples, and the group that imports them when they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any
+
+import click
+
+from cylx.cli.failures import Failures
+
+
+class ExampleCommand(click.Command):
+    """A command whose help leads with examples.
+
+    Parameters
+    ----------
+    examples : sequence of str
+        Command lines.
+    """
+
+    def __init__(self, *args: Any, examples: Sequence[str] = (), **attributes: Any) -> None:  # noqa: ANN401
+        super().__init__(*args, **attributes)
+        self.examples = examples
+
+    def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the examples, and what the command does."""
+        if self.examples:
+            with formatter.section("Examples"):
+                for line in self.examples:
+                    formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
+        super().format_help_text(ctx, formatter)
+
+
+class ExampleGroup(ExampleCommand, click.Group):
+    """A group whose help leads with examples, and whose commands' help does."""
+
+    command_class = ExampleCommand
+
+
+class LazyGroup(ExampleGroup):
+    """A group that knows the homes of its commands, and turns failures into one line and an exit code.
+
+    Parameters
+    ----------
+    homes : mapping of str to str
+        Command to the module that holds it under the same name.
+    """
+
+    def __init__(self, *args: Any, homes: Mapping[str, str], **attributes: Any) -> None:  # noqa: ANN401
+        super().__init__(*args, **attributes)
+        self.homes = homes
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Name the commands, in the order of their use."""
+        return list(self.homes)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Import a command."""
+        if cmd_name not in self.homes:
+            return None
+        command = getattr(import_module(self.homes[cmd_name]), cmd_name)
+        assert isinstance(command, click.Command)
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Find the command, or name the one that was probably meant."""
+        name = args[0]
+        if name not in self.homes and not name.startswith("-"):
+            close = get_close_matches(name, self.homes, n=1)
+            ctx.fail(f"no such command '{name}'" + (f"; did you mean '{close[0]}'?" if close else ""))
+        return super().resolve_command(ctx, args)
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,  # noqa: ANN401
+    ) -> click.Context:
+        """Parse the group's own options."""
+        with Failures():
+            return super().make_context(info_name, args, parent, **extra)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the command."""
+        with Failures(ctx):
+            return super().invoke(ctx)

@@ -1,0 +1,140 @@
+"""The options that several commands share, one function each.
+
+| function | options | the command gets |
+|---|---|---|
+| `configured` | `-c/--config --preset --set --seed --radius --max-cylinders --planes` | `settings`, a `Config` |
+| `talking` | `-q/--quiet -v/--verbose` | `talk`, a `Conversation` |
+| `overwrite_option` | `--overwrite` | `overwrite`, a bool |
+| `json_option` | `--json` | `as_json`, a bool |
+| `debug_option` | `--debug` | nothing |
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from cylx.cli.failures import DEBUG
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+Bounds = tuple[float | None, float | None]
+
+PRESETS = ("auto", "paper")
+
+
+if TYPE_CHECKING:
+    BoundsType = click.ParamType[Bounds]
+else:
+    BoundsType = click.ParamType  # not generic in older versions
+
+
+class RadiusRange(BoundsType):
+    """`MIN:MAX`, either side may be empty."""
+
+    name = "min:max"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Bounds:
+        """Read the two radii."""
+        if isinstance(value, tuple):
+            return value
+        sides = str(value).split(":")
+        if len(sides) != 2 or not any(sides):
+            self.fail(f"'{value}' is not MIN:MAX, such as 0.01:0.2, 0.01: or :0.2", param, ctx)
+        low, high = (self._radius(side, param, ctx) for side in sides)
+        if low is not None and high is not None and low > high:
+            self.fail(f"'{value}' has its smallest radius above its largest; write {sides[1]}:{sides[0]}", param, ctx)
+        return low, high
+
+    def _radius(self, side: str, param: click.Parameter | None, ctx: click.Context | None) -> float | None:
+        """Read one radius, None for an empty side."""
+        if not side.strip():
+            return None
+        try:
+            radius = float(side)
+        except ValueError:
+            self.fail(f"'{side}' is not a number", param, ctx)
+        if not 0 < radius < float("inf"):
+            self.fail(f"'{side}' is not a radius; it must be > 0 and finite", param, ctx)
+        return radius
+
+
+def configured(command: Command) -> Command:
+    """Add the options of the configuration; the command gets `settings`."""
+
+    @functools.wraps(command)
+    def with_settings(
+        *args: object,
+        config: str | None,
+        preset: str | None,
+        overrides: tuple[str, ...],
+        seed: int | None,
+        radius: Bounds | None,
+        max_cylinders: int | None,
+        planes: int | None,
+        **others: object,
+    ) -> object:
+        from cylx.config import load_config, named_options
+
+        options = named_options(seed=seed, radius=radius, max_cylinders=max_cylinders, planes=planes)
+        settings = load_config(path=config, preset=preset, overrides=overrides, options=options)
+        return command(*args, settings=settings, **others)
+
+    for option in reversed(_CONFIGURATION):
+        with_settings = option(with_settings)
+    return with_settings  # type: ignore[return-value]
+
+
+_CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
+    click.option("-c", "--config", metavar="FILE", help="YAML file; 'cylx config init' writes one."),
+    click.option(
+        "--preset",
+        type=click.Choice(PRESETS),
+        help="Where the settings start from: the best there is, or the paper to the letter. The values in the file of"
+        " --config go over it.  [default: auto]",
+    ),
+    click.option(
+        "--set", "overrides", metavar="KEY=VALUE", multiple=True, help="Set one key, as in slicing.planes=80."
+    ),
+    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of everything random.  [default: 0]"),
+    click.option("--radius", type=RadiusRange(), help="Smallest and largest radius, in the unit of the scan."),
+    click.option("--max-cylinders", type=click.IntRange(min=1), metavar="N", help="Stop after so many cylinders."),
+    click.option("--planes", type=click.IntRange(min=0), metavar="N", help="Number of planes through the whole cloud."),
+)
+
+
+def talking(command: Command) -> Command:
+    """Add `-q` and `-v`; the command gets `talk`."""
+
+    @functools.wraps(command)
+    def with_talk(*args: object, quiet: bool, verbose: bool, **others: object) -> object:
+        from cylx.cli.display import Conversation
+
+        return command(*args, talk=Conversation(quiet=quiet, verbose=verbose and not quiet), **others)
+
+    verbose = click.option("-v", "--verbose", is_flag=True, help="Say what each stage kept and dropped, and why.")
+    quiet = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    return quiet(verbose(with_talk))  # type: ignore[return-value]
+
+
+def overwrite_option(command: Command) -> Command:
+    """Add `--overwrite`."""
+    return click.option("--overwrite", is_flag=True, help="Replace output files that exist.")(command)
+
+
+def json_option(command: Command) -> Command:
+    """Add `--json`; the command gets `as_json`."""
+    return click.option("--json", "as_json", is_flag=True, help="Answer in JSON.")(command)
+
+
+def debug_option(command: Command) -> Command:
+    """Add `--debug`, which makes every failure show its traceback."""
+
+    def remember(ctx: click.Context, _: click.Parameter, debug: bool) -> None:
+        ctx.meta[DEBUG] = debug or ctx.meta.get(DEBUG, False)
+
+    return click.option(
+        "--debug", is_flag=True, expose_value=False, callback=remember, help="Show the traceback of a failure."
+    )(command)

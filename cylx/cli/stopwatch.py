@@ -1,0 +1,52 @@
+"""How long the stages of a run took and how much memory it needed, for `--profile`."""
+
+from __future__ import annotations
+
+import sys
+from time import perf_counter
+
+
+class Stopwatch:
+    """An observer that adds up the seconds of each stage of one scan.
+
+    Parameters
+    ----------
+    scan : str
+        The input.
+    """
+
+    def __init__(self, scan: str) -> None:
+        self.scan = scan
+        self.stages: dict[str, float] = {}
+        self._started = perf_counter()
+
+    def stage_started(self, name: str, total: int | None) -> None:
+        """Put the stage on the list."""
+        self.stages.setdefault(name, 0.0)
+
+    def stage_advanced(self, steps: int) -> None:
+        """Ignore; only whole stages are timed."""
+
+    def stage_finished(self, name: str, seconds: float) -> None:
+        """Add the time of a stage."""
+        self.stages[name] = self.stages.get(name, 0.0) + seconds
+
+    def report(self, points: int, cylinders: int) -> dict[str, object]:
+        """Give the times of the scan as a JSON object; `seconds` is from the start until now."""
+        return {
+            "file": self.scan,
+            "points": points,
+            "cylinders": cylinders,
+            "stages": {name: round(seconds, 6) for name, seconds in self.stages.items()},
+            "seconds": round(perf_counter() - self._started, 6),
+        }
+
+
+def peak_memory() -> int | None:
+    """Give the largest resident memory of this process so far, bytes; None where the system does not tell."""
+    try:
+        import resource
+    except ModuleNotFoundError:
+        return None
+    largest = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return largest if sys.platform == "darwin" else largest * 1024

@@ -1,0 +1,157 @@
+"""`cylx synth`: clouds whose cylinders are known."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+
+import click
+
+from cylx.cli.group import ExampleGroup
+from cylx.cli.options import Bounds, RadiusRange, debug_option, overwrite_option
+from cylx.cli.outputs import TRUTH, check_apart
+from cylx.errors import UsageError
+
+if TYPE_CHECKING:
+    from cylx.synthetic import SyntheticScene
+
+    VectorType = click.ParamType[tuple[float, ...]]
+else:
+    VectorType = click.ParamType  # not generic in older versions
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class Vector(VectorType):
+    """`X,Y,Z`."""
+
+    name = "x,y,z"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Read the three numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != 3:
+            self.fail(f"'{value}' is not three numbers such as 100,200,0", param, ctx)
+        return numbers
+
+
+def output_options(command: Command) -> Command:
+    """Add what both scenes have in common: where it lies, and how it is written."""
+    for option in (
+        debug_option,
+        overwrite_option,
+        click.option(
+            "--precision", type=click.Choice(["double", "single"]), default="double", show_default=True,
+            help="Of the coordinates in the file.",
+        ),
+        click.option("--offset", type=Vector(), default="0,0,0", help="Move the scene, in its unit after --scale."),
+        click.option("--scale", type=float, default=1.0, show_default=True, help="Enlarge the scene by a factor."),
+        click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Seed of all chance."),
+    ):  # fmt: skip
+        command = option(command)
+    return command
+
+
+@click.group(cls=ExampleGroup, examples=["cylx synth single can.ply --theta 90", "cylx synth multi room.pcd --seed 7"])
+def synth() -> None:
+    """Make a cloud whose cylinders are known.
+
+    Beside the cloud, NAME.truth.json says where its cylinders are; 'cylx evaluate' compares a result with it.
+    """
+
+
+@synth.command(examples=["cylx synth single can.ply", "cylx synth single can.xyz --theta 90 --sigma 0.005 --p 0.1"])
+@click.argument("out")
+@click.option("--points", type=int, default=10000, show_default=True, help="Number of points.")
+@click.option("--height", type=float, default=4.0, show_default=True, help="Height of the cylinder, in radii.")
+@click.option("--sigma", type=float, default=0.01, show_default=True, help="Noise of a point, in radii.")
+@click.option("--p", type=float, default=0.0, show_default=True, help="Probability of a point to be an outlier.")
+@click.option("--sigma-o", type=float, default=0.04, show_default=True, help="Noise of an outlier, in radii.")
+@click.option("--theta", "theta_deg", type=float, default=360.0, show_default=True, help="Angle seen, degrees.")
+@output_options
+def single(
+    *,
+    out: str,
+    scale: float,
+    offset: tuple[float, ...],
+    precision: str,
+    overwrite: bool,
+    **parameters: Any,  # noqa: ANN401
+) -> None:
+    """Make one cylinder of radius 1, as in the paper.
+
+    OUT ends in .ply, .pcd or .xyz.
+    """
+    from cylx import synthetic
+
+    prepare(out, overwrite=overwrite)
+    scene = synthetic.single(**parameters).moved(scale, offset)
+    write_scene(out, scene, precision=precision, overwrite=overwrite)
+
+
+@synth.command(examples=["cylx synth multi room.ply --cylinders 10", "cylx synth multi room.ply --scale 1000"])
+@click.argument("out")
+@click.option("--points", type=int, default=100000, show_default=True, help="Number of points.")
+@click.option("--cylinders", type=int, default=5, show_default=True, help="Number of cylinders.")
+@click.option("--planes", type=int, default=1, show_default=True, help="Floor, four walls and ceiling: 0 to 6 of them.")
+@click.option("--boxes", type=int, default=2, show_default=True, help="Number of boxes.")
+@click.option("--spheres", type=int, default=2, show_default=True, help="Number of spheres.")
+@click.option("--cones", type=int, default=1, show_default=True, help="Number of cones.")
+@click.option("--noise", type=float, default=0.05, show_default=True, help="Share of points anywhere in the room.")
+@click.option("--sigma", type=float, default=0.002, show_default=True, help="Noise of the other points.")
+@click.option("--radius", type=RadiusRange(), default="0.04:0.16", show_default=True, help="Radii of the cylinders.")
+@click.option("--coverage", "coverage_min_deg", type=float, default=150.0, show_default=True, help="Least angle seen.")
+@click.option("--room", type=float, help="Width of the room.  [default: as wide as the objects need]")
+@output_options
+def multi(
+    *,
+    out: str,
+    scale: float,
+    offset: tuple[float, ...],
+    precision: str,
+    overwrite: bool,
+    radius: Bounds,
+    **parameters: Any,  # noqa: ANN401
+) -> None:
+    """Make a room with cylinders, and with planes, boxes, spheres, cones and noise.
+
+    OUT ends in .ply, .pcd or .xyz.
+    """
+    from cylx import synthetic
+
+    prepare(out, overwrite=overwrite)
+    radius_min, radius_max = radius
+    if radius_min is None or radius_max is None:
+        raise UsageError("--radius", "one side is empty", "give both, such as 0.04:0.16")
+    scene = synthetic.multi(radius_min=radius_min, radius_max=radius_max, **parameters).moved(scale, offset)
+    write_scene(out, scene, precision=precision, overwrite=overwrite)
+
+
+def truth_path(out: str) -> str:
+    """Name the truth that belongs to a cloud."""
+    return str(Path(out).with_name(Path(out).stem + TRUTH))
+
+
+def prepare(out: str, *, overwrite: bool) -> None:
+    """Refuse outputs that could not be written, before anything is made."""
+    from cylx.io import check_writable
+
+    check_apart([], [out, truth_path(out)])
+    for path in (out, truth_path(out)):
+        check_writable(path, overwrite=overwrite)
+
+
+def write_scene(out: str, scene: SyntheticScene, *, precision: str, overwrite: bool) -> None:
+    """Write a scene and its truth."""
+    from cylx.io import write_cloud, write_text
+
+    dtype: Literal["f4", "f8"] = "f4" if precision == "single" else "f8"
+    write_cloud(out, scene.points, properties=None, overwrite=overwrite, dtype=dtype)
+    write_text(truth_path(out), json.dumps(scene.truth(), indent=2) + "\n", overwrite=overwrite)

@@ -1,0 +1,98 @@
+"""Fixtures of the tests: the command line in process and out of it, and a pipeline that answers at once."""
+
+import inspect
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+CIRCLE = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+POINTS = np.round(np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE), np.arange(24) % 5]), 6)
+
+
+def pytest_addoption(parser):
+    parser.addoption("--regen", action="store_true", help="Write the golden results anew; read the diff.")
+
+
+@pytest.fixture
+def run_cylx():
+    """Run the command line in this process: `run_cylx("info", path)` gives exit_code, stdout and stderr."""
+    from cylx.cli import main
+
+    separate = {"mix_stderr": False} if "mix_stderr" in inspect.signature(CliRunner).parameters else {}
+
+    def run(*args, **settings):
+        return CliRunner(**separate).invoke(main, [str(arg) for arg in args], prog_name="cylx", **settings)
+
+    return run
+
+
+@pytest.fixture
+def spawn_cylx():
+    """Run the command line in a process of its own; `prelude` is Python run there before it."""
+
+    def spawn(*args, prelude="", **settings):
+        code = f"{prelude}\nfrom cylx.cli import main\nmain(prog_name='cylx')"
+        command = [sys.executable, "-c", code, *(str(arg) for arg in args)]
+        return subprocess.run(command, capture_output=True, check=False, timeout=120, **settings)
+
+    return spawn
+
+
+@pytest.fixture
+def scan(tmp_path):
+    """A small scan that can be read."""
+    path = tmp_path / "scan.xyz"
+    np.savetxt(path, POINTS, fmt="%.6f")
+    return path
+
+
+@pytest.fixture
+def make_extraction():
+    """Make an extraction of a cloud by hand: cylinders of radius 1, 2, … on the z axis, all points on the first."""
+    from cylx.config import Config
+    from cylx.geometry.cylinder import Cylinder
+    from cylx.records import CylinderFit, Extraction, PointCloud, Scene, StageReport
+
+    def make(cloud=None, config=None, *, cylinders=2):
+        cloud = PointCloud(POINTS) if cloud is None else cloud
+        fits = [
+            CylinderFit(Cylinder((0, 0, 2), (0, 0, 1), i + 1.0, 4.0), 24 - i, 0.25, 2 * np.pi, 3, 0.5, {"slope": 0.125})
+            for i in range(cylinders)
+        ]
+        return Extraction(
+            cylinders=tuple(fits),
+            labels=np.full(len(cloud.points), 0 if fits else -1, np.int32),
+            residuals=np.full(len(cloud.points), 0.0 if fits else np.nan, np.float32),
+            cloud=cloud,
+            scene=Scene(spacing=0.25, noise=0.0, extent=5.0),
+            stages=(StageReport("slicing", 40, 38, {"too few points": 2}),),
+            config=config or Config(),
+            warnings=("made by hand",),
+        )
+
+    return make
+
+
+@pytest.fixture
+def fake_pipeline(monkeypatch, make_extraction):
+    """Put a pipeline in place that answers at once; `calls` has what it was asked, `found` is what it finds."""
+
+    class FakePipeline:
+        def __init__(self):
+            self.calls, self.found = [], 2
+
+        def __call__(self, cloud, config, *, threads=None, observer=None):
+            self.calls.append((cloud, config, threads))
+            observer.stage_started("slicing", 2)
+            observer.stage_advanced(2)
+            observer.stage_finished("slicing", 0.5)
+            if isinstance(self.found, BaseException):
+                raise self.found
+            return make_extraction(cloud, config, cylinders=self.found)
+
+    fake = FakePipeline()
+    monkeypatch.setattr("cylx.pipeline.extract_cylinders", fake)
+    return fake
