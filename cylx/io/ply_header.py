@@ -1,0 +1,205 @@
+"""The header of a PLY file, checked against itself and against the size of the file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cylx.errors import InputError
+from cylx.io.inputs import Input, excerpt
+from cylx.io.names import coordinate_names, mended_names, missing_coordinates
+from cylx.io.rows import short_of_points
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_FORMATS = ("ascii", "binary_little_endian", "binary_big_endian")
+TYPES = {
+    "char": "i1",
+    "uchar": "u1",
+    "short": "i2",
+    "ushort": "u2",
+    "int": "i4",
+    "uint": "u4",
+    "float": "f4",
+    "double": "f8",
+    "int8": "i1",
+    "uint8": "u1",
+    "int16": "i2",
+    "uint16": "u2",
+    "int32": "i4",
+    "uint32": "u4",
+    "float32": "f4",
+    "float64": "f8",
+}
+_MOST_HEADER = 1 << 20
+_REMEDY = "export the file again as PLY 1.0"
+
+
+@dataclass(frozen=True, slots=True)
+class Property:
+    """A property of an element, types as PLY calls them; `length` is the type of its list's length, "" for a scalar."""
+
+    name: str
+    type: str
+    length: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Element:
+    """An element and its properties."""
+
+    name: str
+    count: int
+    properties: list[Property]
+
+    @property
+    def has_lists(self) -> bool:
+        """Whether any of the properties is a list."""
+        return any(item.length for item in self.properties)
+
+    def least_size(self, text: bool) -> int:
+        """Give the bytes that a row takes at least: of a list its length, in text a digit and what ends it."""
+        if text:
+            return max(2 * len(self.properties), 1)
+        return sum(np.dtype(TYPES[item.length or item.type]).itemsize for item in self.properties)
+
+    def lines(self) -> list[str]:
+        """Write the element's part of a header."""
+        names = mended_names([item.name for item in self.properties])
+        types = [f"list {item.length} {item.type}" if item.length else item.type for item in self.properties]
+        return [
+            f"element {self.name} {self.count}",
+            *(f"property {kind} {name}" for kind, name in zip(types, names, strict=True)),
+        ]
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """What a header says: format, elements up to the vertices, and where it ends, in bytes and lines."""
+
+    format: str
+    elements: list[Element]
+    size: int
+    lines: int
+
+    @property
+    def text(self) -> bool:
+        """Whether the body is text."""
+        return self.format == "ascii"
+
+    @property
+    def vertex(self) -> Element:
+        """The points."""
+        return self.elements[-1]
+
+
+def read_header(source: Input) -> Header:
+    """Read the header of a PLY and check it.
+
+    Raises
+    ------
+    InputError
+        If this is no PLY, has no vertices with scalar x, y and z, or is shorter than its header says.
+    """
+    header = _read_lines(source)
+    _check_vertex(header.vertex, source.place)
+    _check_size(header, source)
+    return header
+
+
+def _read_lines(source: Input) -> Header:
+    kind = ""
+    elements: list[Element] = []
+    number = size = 0
+    for number, size, line in _header_lines(source):  # noqa: B007  (both are needed after the last line)
+        where = f"{source.place}:{number}"
+        keyword, *rest = line.split() or [""]
+        if keyword == "end_header":
+            break
+        if number == 1 or keyword in ("", "comment", "obj_info"):
+            continue
+        if keyword == "format":
+            kind = _format(rest, where)
+        elif keyword == "element":
+            elements.append(_element(rest, where))
+        elif keyword == "property" and elements:
+            elements[-1].properties.append(_property(rest, where))
+        else:
+            raise InputError(where, f"{excerpt(line)} is no line of a PLY header", _REMEDY)
+    if not kind:
+        raise InputError(source.place, "the PLY header has no format line", _REMEDY)
+    names = [element.name for element in elements]
+    if "vertex" not in names:
+        raise InputError(source.place, "the PLY header has no vertex element", "give a PLY with points")
+    return Header(kind, elements[: names.index("vertex") + 1], size, number)
+
+
+def _header_lines(source: Input) -> Iterator[tuple[int, int, str]]:
+    """Give number, end and text of each line of the header, which may end in LF, CR LF or CR."""
+    head = source.head(_MOST_HEADER)
+    if head[:3] != b"ply" or head[3:4] not in (b"\n", b"\r", b""):
+        raise InputError(source.place, "is no PLY: it does not begin with the line 'ply'", "give it its right suffix")
+    newline = b"\r" if head[3:4] == b"\r" and head[4:5] != b"\n" else b"\n"
+    start = number = 0
+    while (stop := head.find(newline, start)) >= 0:
+        number += 1
+        line = head[start:stop].decode("utf-8", "backslashreplace").strip()
+        start = stop + 1
+        yield number, start, line
+    if source.size > _MOST_HEADER:
+        raise InputError(source.place, "the PLY header has no end", "export the file again")
+    raise InputError(source.place, "the file ends within the PLY header", "get a complete copy of the file")
+
+
+def _format(words: list[str], where: str) -> str:
+    if len(words) != 2 or words[0] not in _FORMATS or words[1] != "1.0":
+        fault = f"unknown format {excerpt(' '.join(words))}"
+        raise InputError(where, fault, f"use one of {', '.join(_FORMATS)}, version 1.0")
+    return words[0]
+
+
+def _element(words: list[str], where: str) -> Element:
+    if len(words) != 2 or not (words[1].isascii() and words[1].isdecimal() and len(words[1]) < 19):
+        raise InputError(where, f"{excerpt(' '.join(words))} is no name and number of an element", _REMEDY)
+    return Element(words[0], int(words[1]), [])
+
+
+def _property(words: list[str], where: str) -> Property:
+    if len(words) == 2 and words[0] in TYPES:
+        return Property(words[1], words[0])
+    if len(words) == 4 and words[0] == "list" and words[1] in TYPES and words[2] in TYPES:
+        return Property(words[3], words[2], words[1])
+    raise InputError(where, f"{excerpt(' '.join(words))} is no type and name of a property", _REMEDY)
+
+
+def _check_vertex(vertex: Element, place: str) -> None:
+    names = [item.name for item in vertex.properties]
+    missing = missing_coordinates(names)
+    if missing:
+        raise InputError(place, f"the vertex element has no property {missing}", "give a PLY with x, y and z")
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise InputError(place, f"the vertex element has the property {excerpt(twice)} twice", _REMEDY)
+    for item in vertex.properties:
+        if item.length and item.name in coordinate_names(names):
+            raise InputError(place, f"the property {item.name} is a list", "give a PLY with one x, y and z a point")
+    if vertex.count == 0:
+        raise InputError(place, "holds no points", "give a file with points")
+
+
+def _check_size(header: Header, source: Input) -> None:
+    """Refuse counts that could not fit into the file, before anything is allocated for them."""
+    room = source.size - header.size + header.text  # the last line may lack its end
+    for element in header.elements[:-1]:
+        if not element.properties:
+            raise InputError(source.place, f"the element {excerpt(element.name)} has no properties", _REMEDY)
+        room -= element.count * element.least_size(header.text)
+        if room < 0:
+            fault = f"the header promises {element.count} elements {excerpt(element.name)}, the file is too short"
+            raise InputError(source.place, fault, "get a complete copy of the file")
+    held = room // header.vertex.least_size(header.text)
+    if held < header.vertex.count:
+        raise short_of_points(source.place, header.vertex.count, held, at_most=header.text)
