@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cylx.errors import InputError, OutputError, UsageError
-from cylx.io.inputs import Input, open_input
+from cylx.io.inputs import Input, open_input, printable
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.outputs import open_output
 from cylx.io.pcd import read_pcd, write_pcd
@@ -55,7 +55,7 @@ def read_cloud(path: str | Path, *, format: str | None = None) -> PointCloud:  #
             table = _READERS[kind](source)
         except MemoryError:
             raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
-        return _cloud(table, source.place, Source(str(path), kind, source.sha256))
+        return _cloud(table, source.place, Source(_file_name(path), kind, source.sha256))
 
 
 def write_cloud(
@@ -89,7 +89,7 @@ def write_cloud(
     suffix = ".ply" if str(path) == "-" else Path(path).suffix.lower()
     if suffix not in (".ply", ".pcd", *TEXT_SUFFIXES):
         known = ", ".join((".ply", ".pcd", *TEXT_SUFFIXES))
-        raise OutputError(str(path), f"unknown suffix {suffix!r}", f"use one of {known}")
+        raise OutputError(printable(path), f"unknown suffix {suffix!r}", f"use one of {known}")
     table = _table(points, properties or {}, dtype)
     with open_output(path, overwrite=overwrite) as file:
         if suffix == ".ply":
@@ -99,6 +99,11 @@ def write_cloud(
             write_pcd(file, table)
         else:
             write_xyz(file, suffix, table)
+
+
+def _file_name(path: str | Path) -> str:
+    """Give the name of a file as it can be written as UTF-8."""
+    return str(path).encode("utf-8", "replace").decode()
 
 
 def _recognise(source: Input, suffix: str) -> str:

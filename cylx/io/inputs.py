@@ -58,7 +58,7 @@ def open_input(path: str | Path) -> Iterator[Input]:
     InputError
         If there is nothing there, or nothing in it, or it may not be read.
     """
-    place = "standard input" if str(path) == "-" else str(path)
+    place = "standard input" if str(path) == "-" else printable(path)
     with _open(path, place) as stream:
         try:
             if str(path) != "-" and stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
@@ -99,6 +99,11 @@ def read_json(path: str | Path) -> dict[str, Any]:
     if not isinstance(document, dict):
         raise InputError(place, "holds no JSON object", "give a JSON file as cylx writes it")
     return document
+
+
+def printable(path: str | Path) -> str:
+    """Give a path as one line that can be printed, whatever is in it."""
+    return text if (text := str(path)).isprintable() else repr(text)
 
 
 def excerpt(text: str) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from cylx.errors import OutputError
+from cylx.io.inputs import printable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -38,7 +39,7 @@ def check_writable(path: str | Path, *, overwrite: bool) -> None:
         if sys.stdout is None:
             raise OutputError("standard output", "is closed", "give a file name")
         return
-    place = str(path)
+    place = printable(path)
     mode = _mode(path)
     if mode is None:
         _check_folder(_target(path).parent, place)
@@ -86,7 +87,7 @@ def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        _refuse_os_error("standard output" if str(path) in _STDOUT else str(path), error)
+        _refuse_os_error("standard output" if str(path) in _STDOUT else printable(path), error)
 
 
 def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = False) -> None:
@@ -135,7 +136,7 @@ def _mode(path: str | Path) -> int | None:
     except (FileNotFoundError, NotADirectoryError):
         return None
     except (OSError, ValueError) as error:
-        _refuse_os_error(str(path), error)
+        _refuse_os_error(printable(path), error)
 
 
 def _check_folder(folder: Path, place: str) -> None:

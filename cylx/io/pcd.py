@@ -170,9 +170,8 @@ def _read_packed(header: _Header, source: Input) -> NDArray[np.void]:
     source.file.seek(header.size)
     body = source.file.read()
     sizes = np.frombuffer(body[:8].ljust(8, b"\0"), "<u4").tolist()
-    if sizes[0] > len(body) - 8 or len(body) < 8:
-        fault = f"the body should have {sizes[0]} bytes, the file holds {max(len(body) - 8, 0)}"
-        raise InputError(source.place, fault, "get a complete copy of the file")
+    if len(body) < 8 or sizes[0] > len(body) - 8:
+        raise InputError(source.place, "the file ends within the compressed body", "get a complete copy of the file")
     if sizes[1] != header.points * header.width or sizes[1] > _MOST_EXPANSION * sizes[0]:
         fault = f"the body does not hold the {header.points} points that the header promises"
         raise InputError(source.place, fault, "get a complete copy of the file")

@@ -162,8 +162,10 @@ def _format(words: list[str], where: str) -> str:
 
 
 def _element(words: list[str], where: str) -> Element:
-    if len(words) != 2 or not (words[1].isascii() and words[1].isdecimal() and len(words[1]) < 19):
-        raise InputError(where, f"{excerpt(' '.join(words))} is no name and number of an element", _REMEDY)
+    if len(words) != 2:
+        raise InputError(where, f"{excerpt(' '.join(words))} is no name and count of an element", _REMEDY)
+    if not (words[1].isascii() and words[1].isdecimal() and len(words[1]) < 19):
+        raise InputError(where, f"element {excerpt(words[0])} has the impossible count {excerpt(words[1])}", _REMEDY)
     return Element(words[0], int(words[1]), [])
 
 
@@ -200,6 +202,8 @@ def _check_size(header: Header, source: Input) -> None:
         if room < 0:
             fault = f"the header promises {element.count} elements {excerpt(element.name)}, the file is too short"
             raise InputError(source.place, fault, "get a complete copy of the file")
+    if header.text and not header.vertex.has_lists:
+        return  # these rows are counted as they are read
     held = room // header.vertex.least_size(header.text)
     if held < header.vertex.count:
         raise short_of_points(source.place, header.vertex.count, held, at_most=header.text)

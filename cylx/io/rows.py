@@ -71,13 +71,13 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
         If a row has too few or too many columns, or something that is no number of the column's type; or if there are
         fewer rows than `rows.count`.
     """
-    _check_room(source, rows)
+    most = _most_rows(source, rows)
     try:
         with text_lines(source, rows.offset) as lines:
-            table = _load(lines, rows, rows.delimiter)
+            table = _load(lines, rows, rows.delimiter, most)
     except ValueError:  # what is wrong, and in which line, takes a slower look; if nothing is, the rows come with it
         with text_lines(source, rows.offset) as lines:
-            table = _load(_checked(lines, rows, source.place), rows, None)
+            table = _load(_checked(lines, rows, source.place), rows, None, most)
     if rows.count is not None and len(table) < rows.count:
         raise short_of_points(source.place, rows.count, len(table))
     return table
@@ -149,7 +149,7 @@ def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
         return False
 
 
-def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None) -> NDArray[np.void]:
+def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: int | None) -> NDArray[np.void]:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # of empty lines and of an empty file, which is dealt with here
         return np.loadtxt(
@@ -158,7 +158,7 @@ def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None) -> NDArr
             comments=COMMENTS if rows.commented else None,
             delimiter=delimiter,
             skiprows=rows.skip,
-            max_rows=rows.count,
+            max_rows=most,
             ndmin=1,
         )
 
@@ -193,9 +193,7 @@ def check_number(where: str, name: str, column: str, dtype: np.dtype[Any] | None
         raise InputError(where, fault, "write numbers like -1.5 or 2e-3")
 
 
-def _check_room(source: Input, rows: RowFormat) -> None:
-    """Refuse a count of rows that could not fit into the file: a column takes a digit and what ends it."""
-    least = 2 * len(rows.dtype.names or ())
-    room = (source.size - rows.offset - 2 * rows.skip + 1) // least
-    if rows.count is not None and rows.count > room:
-        raise short_of_points(source.place, rows.count, max(room, 0), at_most=True)
+def _most_rows(source: Input, rows: RowFormat) -> int | None:
+    """Give the count of rows, for which memory is taken at once, unless the file has no room: two bytes a column."""
+    room = (source.size - rows.offset + 1) // (2 * len(rows.dtype.names or ()))
+    return rows.count if rows.count is not None and rows.count <= room else None
