@@ -1,22 +1,15 @@
-"""What travels between the stages: shapes with their evidence, and the counts of what was dropped on the way.
-
-Many things of one kind travel as a structure of arrays (`Candidates`, `EllipseFits`); the few cylinders that come out travel
-one by one (`CylinderFit`). All records are frozen: a stage makes new ones and never changes those it was given.
-"""
+"""The cloud: as it was read, as it describes itself, and as the stages work on it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
-
-if TYPE_CHECKING:
-    from cylx.config import Config
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -137,112 +130,70 @@ class Scene:
     extent: float
 
 
-@dataclass(frozen=True, slots=True)
-class StageReport:
-    """What a stage looked at, what it kept, and why it dropped the rest.
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """A cloud in its own units and order: what all stages work on.
 
     Parameters
     ----------
-    name : str
-        The stage.
-    considered, kept : int
-        Things that came in, things that went on.
-    rejected : mapping of str to int
-        Reason to count, no zero counts.
+    points : ndarray of shape (N, 3)
+        In units of the spacing, from the corner of the cloud, in Morton order.
+    order : ndarray of shape (N,)
+        `order[i]` is the index in the cloud of the frame's point i.
+    codes : ndarray of shape (N,)
+        Sorted Morton codes of the points.
+    unit : float
+        Side of the smallest cell, in spacings.
+    voxel_level : int
+        Cells of this level are voxels: six of their sides make the radius of the smallest window.
+    window : float
+        Radius of the smallest window, in spacings.
+    noise : float
+        Standard deviation of points about their surface, in spacings.
+    origin : ndarray of shape (3,)
+        Where the frame's zero lies, scene units.
+    spacing : float
+        The frame's unit, scene units.
     """
 
-    name: str
-    considered: int
-    kept: int
-    rejected: Mapping[str, int] = field(default_factory=dict)
+    points: FloatArray
+    order: IndexArray
+    codes: IndexArray
+    unit: float
+    voxel_level: int
+    window: float
+    noise: float
+    origin: FloatArray
+    spacing: float
 
-
-class Observer(Protocol):
-    """Somebody who watches the pipeline: a progress display, a profile."""
-
-    def stage_started(self, name: str, total: int | None) -> None:
-        """Begin a stage of `total` steps, None if their number is not known."""
-
-    def stage_advanced(self, steps: int) -> None:
-        """Count `steps` further steps of the present stage."""
-
-    def stage_finished(self, name: str, seconds: float) -> None:
-        """End a stage that took `seconds`."""
-
-
-class SilentObserver:
-    """The observer nobody listens to."""
-
-    def stage_started(self, name: str, total: int | None) -> None:
-        """Ignore."""
-
-    def stage_advanced(self, steps: int) -> None:
-        """Ignore."""
-
-    def stage_finished(self, name: str, seconds: float) -> None:
-        """Ignore."""
+    def to_scene(self, cylinder: Cylinder) -> Cylinder:
+        """Give a cylinder of the frame in scene units."""
+        return cylinder.moved(self.origin, self.spacing)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class CylinderFit:
-    """A cylinder and the evidence for it.
+class Ground:
+    """What cylinders are fitted to: the points in cells, how flat each one's surroundings are, and the noise.
 
     Parameters
     ----------
-    cylinder : Cylinder
-        The shape; its point is the middle of the visible extent.
-    inliers : int
-        Points of the cloud that carry its label.
-    rmse : float
-        Root mean square of the inliers' distances to the surface, scene units.
-    coverage : float
-        Angle about the axis that the inliers cover, radians, in (0, 2 pi].
-    support : int
-        Candidates in its cluster.
-    payoff : float
-        Mean payoff of the cluster, in [0, 1].
-    evidence : mapping of str to float
-        What the verification measured, by the name of the test.
+    cells : Cells
+        All points of the frame.
+    flatness : ndarray of shape (N,)
+        Radius of the largest flat window that holds the point, 0 if there is none; frame units.
+    noise : float
+        Frame units.
     """
 
-    cylinder: Cylinder
-    inliers: int
-    rmse: float
-    coverage: float
-    support: int
-    payoff: float
-    evidence: Mapping[str, float] = field(default_factory=dict)
+    cells: Cells
+    flatness: FloatArray
+    noise: float
 
+    @property
+    def points(self) -> FloatArray:
+        """The points, shape (N, 3)."""
+        return self.cells.points
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Extraction:
-    """All that one run found out about one cloud.
-
-    Parameters
-    ----------
-    cylinders : tuple of CylinderFit
-        Ordered by inliers, descending; the index is the `id`.
-    labels : ndarray of shape (N,), int32
-        Cylinder of each finite point of the cloud, -1 for none.
-    residuals : ndarray of shape (N,), float32
-        Signed distance of each labelled point to its cylinder's surface, scene units, + is outside; NaN without a label.
-    cloud : PointCloud
-        What was looked at.
-    scene : Scene
-        What the cloud says about itself.
-    stages : tuple of StageReport
-        Counts per stage, in order.
-    config : Config
-        The resolved configuration: nothing in it is None that the run depended on.
-    warnings : tuple of str
-        What a user should know before trusting the answer.
-    """
-
-    cylinders: tuple[CylinderFit, ...]
-    labels: NDArray[np.int32]
-    residuals: NDArray[np.float32]
-    cloud: PointCloud
-    scene: Scene
-    stages: tuple[StageReport, ...]
-    config: Config
-    warnings: tuple[str, ...] = ()
+    def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
+        """Tell which points may lie on a cylinder: those in flat windows of two radii belong to something flatter."""
+        return np.asarray(self.flatness[indices] < 2.0 * radius, dtype=np.bool_)

@@ -1,0 +1,208 @@
+"""Robust orthogonal-distance fit of a cylinder to points: one kernel for candidates, clusters and pieces.
+
+Minimises sum rho(d_i - r) over the five degrees of freedom of a cylinder, d_i being the distance of point i from the axis, by
+Gauss-Newton steps under Tukey's biweight. Started in the basin it reaches the Cramer-Rao bound; the radius keeps the bias
+sigma^2 / (2 r) of orthogonal distances, which `unbiased_radius` takes off (Al-Sharadqah and Chernov, EJS 3, 2009).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.geometry.small_matrices import fill_frame, solve_in_place
+
+FloatArray = NDArray[np.float64]
+
+TUKEY = 4.685
+"""Tuning constant of the biweight at 95 % efficiency, in standard deviations."""
+TUKEY_SPREAD = 1.15
+"""Standard deviation of Gaussian residuals over that of the same residuals weighted by the biweight at 4.685."""
+
+
+class Kernel(NamedTuple):
+    """Width of the biweight over the steps of a fit: from `start`, to `decay` times the last and to `tuning` times the spread.
+
+    Parameters
+    ----------
+    start, floor : float
+        First and least half width, length.
+    decay : float
+        Factor a step, at most 1.
+    tuning : float
+        Half width in standard deviations of the weighted residuals; infinite: a fixed schedule.
+    """
+
+    start: float
+    floor: float
+    decay: float
+    tuning: float
+
+
+@njit(cache=True, nogil=True)
+def fit_in_place(
+    points: FloatArray,
+    n: int,
+    model: FloatArray,
+    low: float,
+    high: float,
+    start: float,
+    floor: float,
+    decay: float,
+    tuning: float,
+    steps: int,
+    normal: FloatArray,
+    right: FloatArray,
+    frame: FloatArray,
+) -> float:
+    """Fit `model` = (point, direction, radius), shape (7,), to points[:n] whose height lies in [low, high].
+
+    Heights are measured from the model's point along its direction. `normal` (5, 5), `right` (5,) and `frame` (2, 3) are scratch.
+
+    Returns
+    -------
+    float
+        Standard deviation of the weighted residuals at the last step; negative if the fit broke down.
+    """
+    width = start
+    spread = start / 3.0
+    row = np.empty(5)
+    for step in range(steps):
+        fill_frame(model[3:6], frame)
+        for a in range(5):
+            right[a] = 0.0
+            for b in range(5):
+                normal[a, b] = 0.0
+        weights = 0.0
+        squares = 0.0
+        reach = 0.0
+        for i in range(n):
+            dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+            z = dx * model[3] + dy * model[4] + dz * model[5]
+            if z < low or z > high:
+                continue
+            x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+            y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+            distance = math.sqrt(x * x + y * y) + 1e-300
+            residual = distance - model[6]
+            ratio = residual / width
+            if abs(ratio) >= 1.0:
+                continue
+            weight = (1.0 - ratio * ratio) ** 2
+            row[0], row[1] = x / distance, y / distance
+            row[2], row[3], row[4] = z * row[0], z * row[1], 1.0
+            for a in range(5):
+                scaled = weight * row[a]
+                right[a] += scaled * residual
+                for b in range(a + 1):
+                    normal[a, b] += scaled * row[b]
+            weights += weight
+            squares += weight * residual * residual
+            reach = max(reach, abs(z))
+        if weights < 8.0:
+            return -1.0
+        for a in range(5):
+            normal[a, a] *= 1.0 + 1e-9
+            for b in range(a + 1, 5):
+                normal[a, b] = normal[b, a]
+        if not solve_in_place(normal, right, 5):
+            return -1.0
+        spread = math.sqrt(squares / weights)
+        size = max(max(abs(right[0]), abs(right[1])), abs(right[4]))
+        size = max(size, max(abs(right[2]), abs(right[3])) * reach)
+        damping = 1.0 if size < 0.5 * model[6] else 0.5 * model[6] / size
+        length = 0.0
+        for d in range(3):
+            model[d] += damping * (right[0] * frame[0, d] + right[1] * frame[1, d])
+            model[3 + d] += damping * (right[2] * frame[0, d] + right[3] * frame[1, d])
+            length += model[3 + d] ** 2
+        length = math.sqrt(length)
+        for d in range(3):
+            model[3 + d] /= length
+        model[6] += damping * right[4]
+        if not (0.0 < model[6] < 1e12):
+            return -1.0
+        # a fixed schedule needs no more than its floor; the estimate of a final fit is iterated to its fixed point
+        if (decay == 1.0 and size < 1e-9 * spread) or (width <= floor and size < 1e-2 * spread and decay < 1.0):
+            break
+        width = max(floor, min(decay * width, tuning * spread))
+    return spread
+
+
+def fit_cylinder(
+    points: FloatArray, model: FloatArray, *, low: float, high: float, kernel: Kernel, steps: int
+) -> tuple[FloatArray, float] | None:
+    """Fit a cylinder robustly, starting from a rough one.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+    model : ndarray of shape (7,)
+        Start: a point of the axis, its unit direction, the radius. Not changed.
+    low, high : float
+        Only points whose height from the model's point lies between these take part.
+    kernel : Kernel
+        Schedule of the weight function's width.
+    steps : int
+        Most Gauss-Newton steps.
+
+    Returns
+    -------
+    model : ndarray of shape (7,)
+        The fitted cylinder.
+    spread : float
+        Standard deviation of the weighted residuals.
+
+    None if fewer than about eight points take part or the fit diverges.
+    """
+    fitted = np.array(model, dtype=np.float64)
+    scratch = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
+    spread = fit_in_place(points, len(points), fitted, low, high, *kernel, steps, *scratch)
+    return None if spread < 0 else (fitted, float(spread))
+
+
+def unbiased_radius(radius: float, spread: float) -> float:
+    """Take off the radius the bias sigma^2 / (2 r) that orthogonal distances under isotropic noise have."""
+    return radius - spread * spread / (2.0 * radius)
+
+
+@njit(cache=True, nogil=True)
+def candidate_quality(
+    points: FloatArray,
+    n: int,
+    model: FloatArray,
+    width: float,
+    frame: FloatArray,
+    bins: NDArray[np.int64],
+    quality: FloatArray,
+) -> None:
+    """Fill `quality` (4,) with what supports a cylinder among points[:n].
+
+    The inliers (within `width` of the surface), the extent of their heights, the share of the angular `bins` that they fill, and
+    the number of points further in.
+    """
+    fill_frame(model[3:6], frame)
+    for a in range(len(bins)):
+        bins[a] = 0
+    lowest, highest, count, inside = math.inf, -math.inf, 0, 0
+    for i in range(n):
+        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        residual = math.sqrt(x * x + y * y) - model[6]
+        if abs(residual) < width:
+            z = dx * model[3] + dy * model[4] + dz * model[5]
+            lowest, highest = min(lowest, z), max(highest, z)
+            bins[int((math.atan2(y, x) / (2.0 * math.pi) + 0.5) * len(bins)) % len(bins)] += 1
+            count += 1
+        elif residual < 0.0:
+            inside += 1
+    filled = 0
+    for a in range(len(bins)):
+        filled += 1 if bins[a] > 0 else 0
+    quality[0], quality[1] = count, highest - lowest if count else 0.0
+    quality[2], quality[3] = filled / len(bins), inside

@@ -1,0 +1,60 @@
+"""Lines in space: their common perpendicular."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+PARALLEL = 1e-6
+"""Below this angle, in radians, rounding of the directions moves the feet more than taking the lines for parallel does."""
+
+
+def common_perpendicular(
+    first_points: FloatArray, first_directions: FloatArray, second_points: FloatArray, second_directions: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Give the feet, the angle and the axis of the shortest motion from one line to another, for pairs of lines.
+
+    Directions are taken up to sign, so the angle is at most a right angle.
+
+    Parameters
+    ----------
+    first_points, second_points : ndarray of shape (..., 3)
+        A point of each line.
+    first_directions, second_directions : ndarray of shape (..., 3)
+        Unit vectors.
+
+    Returns
+    -------
+    first_feet, second_feet : ndarray of shape (..., 3)
+        m1 and m2 of section 3.1: the points of the lines that are closest to each other. For parallel lines the foot is the first
+        line's point.
+    angle : ndarray of shape (...)
+        beta, in [0, pi / 2]; by the arc tangent, which is exact for small angles where the paper's arc sine is not.
+    axis : ndarray of shape (..., 3)
+        s, unit, orthogonal to both lines; the rotation by `angle` about it turns the first direction into the second.
+    """
+    sign = np.where((first_directions * second_directions).sum(-1, keepdims=True) < 0, -1.0, 1.0)
+    turned = sign * second_directions
+    cosine = (first_directions * turned).sum(-1, keepdims=True)
+    normal = np.cross(first_directions, turned)
+    sine = np.linalg.norm(normal, axis=-1, keepdims=True)
+    angle = np.arctan2(sine, cosine)
+    parallel = angle < PARALLEL
+    across = second_points - first_points
+    a, b = (across * first_directions).sum(-1, keepdims=True), (across * turned).sum(-1, keepdims=True)
+    square = np.where(parallel, 1.0, sine * sine)
+    t1 = np.where(parallel, 0.0, (a - cosine * b) / square)
+    t2 = np.where(parallel, -b, (cosine * a - b) / square)
+    helper = np.zeros_like(first_directions)
+    np.put_along_axis(helper, np.abs(first_directions).argmin(-1)[..., None], 1.0, axis=-1)
+    arbitrary = np.cross(first_directions, helper)
+    arbitrary = arbitrary / np.linalg.norm(arbitrary, axis=-1, keepdims=True)
+    axis = np.where(parallel, arbitrary, normal / np.where(parallel, 1.0, sine))
+    return (
+        first_points + t1 * first_directions,
+        second_points + t2 * turned,
+        np.where(parallel, 0.0, angle)[..., 0],
+        axis,
+    )

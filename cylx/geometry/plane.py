@@ -1,0 +1,51 @@
+"""The plane: a point, a normal, a frame in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.geometry.cylinder import axis_frame
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plane:
+    """A plane with a right-handed frame (first, second, normal).
+
+    Parameters
+    ----------
+    point : ndarray of shape (3,)
+        Zero of its coordinates.
+    normal : ndarray of shape (3,)
+        Unit vector.
+    """
+
+    point: FloatArray
+    normal: FloatArray
+
+    def heights(self, points: FloatArray) -> FloatArray:
+        """Give signed distances of points (N, 3) from the plane, shape (N,)."""
+        return np.asarray((points - self.point) @ self.normal)
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Give coordinates of points (N, 3) in the plane, along the normal, shape (N, 2)."""
+        first, second = axis_frame(self.normal)
+        return (points - self.point) @ np.column_stack([first, second])
+
+    def lift(self, coordinates: FloatArray) -> FloatArray:
+        """Give the points in space of coordinates (..., 2) in the plane, shape (..., 3)."""
+        return self.point + self.lift_vectors(coordinates)
+
+    def lift_vectors(self, vectors: FloatArray) -> FloatArray:
+        """Give the vectors in space of vectors (..., 2) in the plane, shape (..., 3)."""
+        return np.asarray(vectors @ np.stack(axis_frame(self.normal)))
+
+
+def random_directions(count: int, rng: np.random.Generator) -> FloatArray:
+    """Draw unit vectors evenly from the sphere, shape (count, 3)."""
+    vectors = rng.standard_normal((count, 3))
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))

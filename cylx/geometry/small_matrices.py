@@ -1,0 +1,111 @@
+"""Linear algebra of a few rows, as scalar loops for the kernels: no allocation, no LAPACK, quick to compile."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def solve_in_place(matrix: FloatArray, right: FloatArray, n: int) -> bool:
+    """Solve the leading n x n system by elimination with partial pivoting; the solution replaces `right`.
+
+    Parameters
+    ----------
+    matrix : ndarray of shape (>= n, >= n)
+        Overwritten.
+    right : ndarray of shape (>= n,)
+        Overwritten with the solution.
+    n : int
+        Size of the system.
+
+    Returns
+    -------
+    bool
+        False if the matrix is singular to working precision.
+    """
+    largest = 0.0
+    for i in range(n):
+        largest = max(largest, abs(matrix[i, i]))
+    for i in range(n):
+        pivot = i
+        for k in range(i + 1, n):
+            if abs(matrix[k, i]) > abs(matrix[pivot, i]):
+                pivot = k
+        if abs(matrix[pivot, i]) <= 1e-14 * largest:
+            return False
+        if pivot != i:
+            for j in range(i, n):
+                matrix[i, j], matrix[pivot, j] = matrix[pivot, j], matrix[i, j]
+            right[i], right[pivot] = right[pivot], right[i]
+        for k in range(i + 1, n):
+            factor = matrix[k, i] / matrix[i, i]
+            for j in range(i, n):
+                matrix[k, j] -= factor * matrix[i, j]
+            right[k] -= factor * right[i]
+    for i in range(n - 1, -1, -1):
+        value = right[i]
+        for j in range(i + 1, n):
+            value -= matrix[i, j] * right[j]
+        right[i] = value / matrix[i, i]
+    return True
+
+
+@njit(cache=True, nogil=True)
+def symmetric_eigen(matrix: FloatArray, vectors: FloatArray) -> None:
+    """Diagonalise a symmetric 3 x 3 matrix by Jacobi rotations.
+
+    Parameters
+    ----------
+    matrix : ndarray of shape (3, 3)
+        Overwritten; the eigenvalues are left on its diagonal, in no order.
+    vectors : ndarray of shape (3, 3)
+        Overwritten with the unit eigenvectors, one a column.
+    """
+    for i in range(3):
+        for j in range(3):
+            vectors[i, j] = 1.0 if i == j else 0.0
+    for _ in range(12):
+        off = abs(matrix[0, 1]) + abs(matrix[0, 2]) + abs(matrix[1, 2])
+        if off <= 1e-15 * (abs(matrix[0, 0]) + abs(matrix[1, 1]) + abs(matrix[2, 2])):
+            return
+        for p in range(2):
+            for q in range(p + 1, 3):
+                if matrix[p, q] == 0.0:
+                    continue
+                theta = (matrix[q, q] - matrix[p, p]) / (2.0 * matrix[p, q])
+                t = 1.0 / (abs(theta) + math.sqrt(theta * theta + 1.0))
+                if theta < 0.0:
+                    t = -t
+                c = 1.0 / math.sqrt(t * t + 1.0)
+                s = t * c
+                for k in range(3):
+                    a, b = matrix[k, p], matrix[k, q]
+                    matrix[k, p], matrix[k, q] = c * a - s * b, s * a + c * b
+                for k in range(3):
+                    a, b = matrix[p, k], matrix[q, k]
+                    matrix[p, k], matrix[q, k] = c * a - s * b, s * a + c * b
+                for k in range(3):
+                    a, b = vectors[k, p], vectors[k, q]
+                    vectors[k, p], vectors[k, q] = c * a - s * b, s * a + c * b
+
+
+@njit(cache=True, nogil=True)
+def fill_frame(direction: FloatArray, frame: FloatArray) -> None:
+    """Fill the rows of `frame` (2, 3) with unit vectors that make a right-handed frame with a unit direction (3,)."""
+    x, y, z = direction[0], direction[1], direction[2]
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        a, b, c = 0.0, z, -y
+    elif abs(y) <= abs(z):
+        a, b, c = -z, 0.0, x
+    else:
+        a, b, c = y, -x, 0.0
+    length = math.sqrt(a * a + b * b + c * c)
+    a, b, c = a / length, b / length, c / length
+    frame[0, 0], frame[0, 1], frame[0, 2] = a, b, c
+    frame[1, 0], frame[1, 1], frame[1, 2] = y * c - z * b, z * a - x * c, x * b - y * a

@@ -1,0 +1,66 @@
+"""The method on one screen: slice, ellipses, candidates, clustering, averaging; then verification, merging and labels."""
+
+from __future__ import annotations
+
+import os
+
+from cylx.config import Config
+from cylx.geometry.cells import Cells
+from cylx.pipeline.conclusion import conclude
+from cylx.pipeline.journal import Journal
+from cylx.pipeline.sources import candidates_of_slices, ellipses_of_slices, windows_and_flatness
+from cylx.pipeline.turns import Turns
+from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
+from cylx.scene import check_usable, make_frame, radius_range, resolve
+from cylx.stages.clustering import CandidateGame, thin_candidates
+
+__all__ = ["extract_cylinders"]
+
+
+def extract_cylinders(
+    cloud: PointCloud, config: Config, *, threads: int | None = None, observer: Observer | None = None
+) -> Extraction:
+    """Find the cylinders of a cloud.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    config : Config
+        `null` values are read off the cloud.
+    threads : int, optional
+        Does not change the result; all cores by default.
+    observer : Observer, optional
+        Is told of stages and their times.
+
+    Returns
+    -------
+    Extraction
+
+    Raises
+    ------
+    InputError
+        If no cylinder could be told from anything else in the cloud (see `cylx.scene.check_usable`).
+    """
+    check_usable(cloud.points, cloud.source.file)
+    threads = threads or os.cpu_count() or 1
+    journal = Journal(observer or SilentObserver())
+    with journal.stage("scene"):
+        frame, scene = make_frame(cloud.points, config)
+        config = resolve(config, scene)
+        radii = radius_range(config, frame)
+    with journal.stage("curvature"):
+        windows, flatness = windows_and_flatness(frame, radii, config, threads, journal)
+        ground = Ground(Cells(frame.points, frame.codes), flatness, frame.noise)
+    with journal.stage("slicing"):
+        fits = ellipses_of_slices(frame, flatness, radii, config, threads, journal)
+    with journal.stage("candidates"):
+        candidates = Candidates.joined([windows, candidates_of_slices(fits, frame, radii, config, journal)])
+    with journal.stage("clustering"):
+        players = thin_candidates(candidates) if config.clustering.population == "local" else candidates
+        turns = Turns(CandidateGame(players, config.clustering), players, windows, ground, radii, config)
+    with journal.stage("averaging"):
+        findings = turns.play(journal)
+    with journal.stage("merging"):
+        findings = turns.merge(findings, journal)
+    with journal.stage("labelling"):
+        return conclude(cloud, frame, scene, ground, findings, journal.reports, config)

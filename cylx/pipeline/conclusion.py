@@ -1,0 +1,73 @@
+"""From findings in the frame to the answer in the scene."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cylx.config import Config
+from cylx.records import CylinderFit, Extraction, Finding, Frame, Ground, PointCloud, Scene, StageReport
+from cylx.stages.labelling import label_points
+
+
+def conclude(
+    cloud: PointCloud,
+    frame: Frame,
+    scene: Scene,
+    ground: Ground,
+    findings: list[Finding],
+    reports: list[StageReport],
+    config: Config,
+) -> Extraction:
+    """Label the points, number the cylinders by their inliers, and put everything into scene units.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    frame : Frame
+    scene : Scene
+    ground : Ground
+    findings : list of Finding
+    reports : list of StageReport
+    config : Config
+        Resolved.
+
+    Returns
+    -------
+    Extraction
+    """
+    labels, residuals = label_points([finding.segment for finding in findings], ground)
+    counts = np.bincount(labels[labels >= 0], minlength=len(findings))
+    order = [int(i) for i in np.lexsort((np.arange(len(findings)), -counts)) if counts[i] > 0]
+    squares = np.bincount(labels[labels >= 0], residuals[labels >= 0] ** 2, minlength=len(findings))
+    fits = [
+        CylinderFit(
+            frame.to_scene(findings[i].segment.cylinder),
+            int(counts[i]),
+            float(np.sqrt(squares[i] / counts[i])) * frame.spacing,
+            findings[i].coverage,
+            findings[i].support,
+            findings[i].payoff,
+            findings[i].measures,
+        )
+        for i in order
+    ]
+    number = np.full(len(findings) + 1, -1, np.int32)  # the last entry is what label -1 maps to
+    number[order] = np.arange(len(order), dtype=np.int32)
+    in_cloud = np.empty(len(labels), np.int32), np.empty(len(labels), np.float32)
+    in_cloud[0][frame.order] = number[labels]
+    in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
+    return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, tuple(_warnings(scene, fits)))
+
+
+def _warnings(scene: Scene, fits: list[CylinderFit]) -> list[str]:
+    """Say what a user should know before trusting the answer."""
+    out = []
+    if scene.noise > scene.spacing:
+        out.append(
+            f"the noise ({scene.noise:.3g}) exceeds the spacing of the points ({scene.spacing:.3g}): "
+            f"cylinders with a radius below about {10 * scene.noise:.3g} cannot be told from noise"
+        )
+    thin = sum(1 for fit in fits if fit.coverage < np.radians(60.0))
+    if thin:
+        out.append(f"{thin} cylinder{'s' if thin > 1 else ''} covered by less than 60 degrees: the radius is uncertain")
+    return out

@@ -1,0 +1,82 @@
+"""The two sources of candidates: slices, as in the paper, and local curvature."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.config import Config
+from cylx.pipeline.journal import Journal
+from cylx.records import Candidates, EllipseFit, Frame
+from cylx.stages.candidates import polish_candidates, propose_cylinders
+from cylx.stages.curvature import find_curved_windows
+from cylx.stages.ellipses import fit_ellipses
+from cylx.stages.slicing import cut_slice, draw_planes
+
+FloatArray = NDArray[np.float64]
+
+LINK = 4.0
+"""Points of a slice within this many spacings are connected."""
+
+
+def windows_and_flatness(
+    frame: Frame, radii: tuple[float, float], config: Config, threads: int, journal: Journal
+) -> tuple[Candidates, FloatArray]:
+    """Propose candidates from curved windows, and tell which points lie in flat ones."""
+    if "curvature" not in config.candidates.sources:
+        return Candidates.joined([]), np.zeros(len(frame.points))
+    windows, flatness, report = find_curved_windows(frame, radii, config.candidates, threads)
+    journal.reports.append(report)
+    return windows, flatness
+
+
+def ellipses_of_slices(
+    frame: Frame, flatness: FloatArray, radii: tuple[float, float], config: Config, threads: int, journal: Journal
+) -> list[list[EllipseFit]]:
+    """Cut the cloud by random planes and fit all ellipses; each slice has a generator of its own."""
+    if "slices" not in config.candidates.sources:
+        return []
+    planes = draw_planes(frame, config.slicing, config.seed)
+    thickness = (config.slicing.thickness or 0.0) / frame.spacing
+    tolerance = (config.ellipses.tolerance or 0.0) / frame.spacing
+    # points of flat windows are explained already; the paper's preset has none
+    eligible = flatness == 0.0 if flatness.any() else None
+
+    def work(index: int) -> list[EllipseFit] | None:
+        section = cut_slice(frame, planes[index], thickness, eligible)
+        if len(section.points) < config.slicing.min_points:
+            return None
+        return fit_ellipses(
+            section,
+            config.ellipses,
+            min_points=config.slicing.min_points,
+            link=LINK,
+            tolerance=tolerance,
+            radius_range=radii,
+            rng=np.random.default_rng([config.seed, 3, index]),
+        )
+
+    with ThreadPoolExecutor(threads) as pool:
+        results = list(pool.map(work, range(len(planes))))
+    fits = [result or [] for result in results]
+    few = sum(1 for result in results if result is None)
+    journal.report("slicing", len(planes), len(planes) - few, {"too few points": few})
+    empty = sum(1 for result in results if result == [])
+    journal.report("ellipses", len(planes) - few, sum(map(len, fits)), {"no ellipse in the slice": empty})
+    return fits
+
+
+def candidates_of_slices(
+    fits: list[list[EllipseFit]], frame: Frame, radii: tuple[float, float], config: Config, journal: Journal
+) -> Candidates:
+    """Make two candidates of each ellipse, and polish them if asked for."""
+    proposed = propose_cylinders(fits)
+    if not fits:
+        return proposed
+    kept = proposed
+    if config.candidates.polish and len(proposed):
+        kept = polish_candidates(proposed, frame, radii, config.candidates)
+    journal.report("candidates", len(proposed), len(kept), {"does not fit": len(proposed) - len(kept)})
+    return kept

@@ -1,0 +1,128 @@
+"""Clustering, averaging and verification in turns: one accepted cylinder after the other, removing what it explains."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+
+from cylx.config import Config
+from cylx.pipeline.journal import Journal
+from cylx.records import Candidates, Finding, Ground, Segment
+from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
+from cylx.stages.clustering import CandidateGame, agreement
+from cylx.stages.merging import drop_claimed, merge_pieces
+from cylx.stages.verification import verify
+
+
+class Turns:
+    """The loop over clusters.
+
+    Parameters
+    ----------
+    game : CandidateGame
+    players : Candidates
+        Those in the game.
+    windows : Candidates
+        All curved windows: what a cylinder must agree with.
+    ground : Ground
+        The cloud.
+    radii : tuple of float
+        Least and greatest radius, frame units; they hold for the fitted cylinders, too.
+    config : Config
+        Resolved.
+    """
+
+    def __init__(
+        self,
+        game: CandidateGame,
+        players: Candidates,
+        windows: Candidates,
+        ground: Ground,
+        radii: tuple[float, float],
+        config: Config,
+    ) -> None:
+        self._game = game
+        self._players = players
+        self._windows = windows
+        self._ground = ground
+        self._radii = radii
+        self._config = config
+
+    def play(self, journal: Journal) -> list[Finding]:
+        """Take cluster after cluster until none is left, or until as many cylinders as asked for are found."""
+        findings: list[Finding] = []
+        rejected: Counter[str] = Counter()
+        while (cluster := self._game.next_cluster()) is not None:
+            segment = average_cluster(self._players, cluster, self._config.averaging)
+            fitted = self._fit(segment)
+            found = fitted if isinstance(fitted, str) else self._judge(fitted, len(cluster.members), cluster.payoff)
+            if isinstance(found, Finding):
+                findings.append(found)
+                self._game.withdraw(self._game.explained_by(found.segment))
+            else:
+                rejected[found] += 1
+                if isinstance(fitted, Segment):  # its like would lead to the same fit again
+                    self._game.withdraw(self._game.explained_by(fitted, closely=True))
+            journal.advance()
+            if self._enough(findings):
+                break
+        journal.reports.append(self._game.report())
+        journal.report("verification", len(findings) + rejected.total(), len(findings), rejected)
+        return findings
+
+    def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
+        """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
+        kept = findings
+        joined = claimed = 0
+        if self._config.averaging.merge:
+            pieces = merge_pieces(findings, self._ground, self._join)
+            kept = drop_claimed(pieces, len(self._ground.points))
+            joined, claimed = len(findings) - len(pieces), len(pieces) - len(kept)
+        if self._config.averaging.refine:
+            kept = [self._finish(finding) for finding in kept]
+        kept = sorted(kept, key=lambda finding: -len(finding.points))
+        beyond = kept[self._config.max_cylinders :] if self._config.max_cylinders else []
+        kept = kept[: len(kept) - len(beyond)]
+        rejected = {"joined": joined, "claimed by a better one": claimed, "beyond max_cylinders": len(beyond)}
+        journal.report("merging", len(findings), len(kept), rejected)
+        return kept
+
+    def _finish(self, finding: Finding) -> Finding:
+        """Fit a finding to all its points; up to here a sample of them was enough."""
+        fitted = refit(finding.segment, self._ground)
+        return finding if isinstance(fitted, str) else replace(finding, segment=fitted)
+
+    def _enough(self, findings: list[Finding]) -> bool:
+        """Tell whether to stop early: the paper's order is that of the clusters, ours that of the cylinders."""
+        most = self._config.max_cylinders
+        return most is not None and not self._config.averaging.merge and len(findings) >= most
+
+    def _fit(self, segment: Segment) -> Segment | str:
+        return (refine if self._config.averaging.refine else measure_extent)(segment, self._ground)
+
+    def _join(self, segment: Segment, best: Finding) -> Finding | None:
+        """Refit and judge a joined segment in the light of the better of its parts."""
+        fitted = refit(segment, self._ground)
+        found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
+        return found if isinstance(found, Finding) else None
+
+    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | str:
+        """Verify a segment; the first test it failed if it does not pass."""
+        if not self._radii[0] <= segment.model[6] <= self._radii[1]:
+            return "radius out of range"
+        share = agreement(self._windows, segment)
+        verdict = verify(segment, self._ground, payoff, share, self._config.verification)
+        if self._config.verification.enabled and verdict.reasons:
+            return verdict.reasons[0]
+        if len(verdict.points) == 0:
+            return "too few points"
+        return Finding(
+            segment,
+            verdict.points,
+            support,
+            payoff,
+            verdict.coverage,
+            verdict.offset_error,
+            verdict.tilt_error,
+            verdict.measures,
+        )

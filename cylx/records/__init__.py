@@ -1,0 +1,29 @@
+"""What travels between the stages: shapes with their evidence, and the counts of what was dropped on the way.
+
+Many things of one kind travel as a structure of arrays (`Candidates`); the few cylinders that come out travel one by one. All
+records are frozen: a stage makes new ones and never changes those it was given.
+"""
+
+from cylx.records.clouds import Frame, Ground, PointCloud, Scene, Source
+from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
+from cylx.records.outcomes import CylinderFit, Extraction, Finding, Segment
+from cylx.records.progress import Observer, SilentObserver, StageReport
+
+__all__ = [
+    "Candidates",
+    "Cluster",
+    "CylinderFit",
+    "EllipseFit",
+    "Extraction",
+    "Finding",
+    "Frame",
+    "Ground",
+    "Observer",
+    "PointCloud",
+    "Scene",
+    "Segment",
+    "SilentObserver",
+    "Slice",
+    "Source",
+    "StageReport",
+]

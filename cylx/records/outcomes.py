@@ -1,0 +1,140 @@
+"""What is a cylinder: segments, findings, and the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.geometry.cylinder import Cylinder
+from cylx.records.clouds import PointCloud, Scene
+from cylx.records.progress import StageReport
+
+if TYPE_CHECKING:
+    from cylx.config import Config
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Segment:
+    """A piece of a cylinder in the frame of the cloud, before it is judged.
+
+    Parameters
+    ----------
+    model : ndarray of shape (7,)
+        Middle of the axis, unit direction, radius.
+    half : float
+        Half its height.
+    spread : float
+        Robust standard deviation of its residuals; 0 if it was not fitted.
+    """
+
+    model: FloatArray
+    half: float
+    spread: float
+
+    @property
+    def cylinder(self) -> Cylinder:
+        """The shape, in the frame."""
+        return Cylinder(self.model[:3], self.model[3:6], float(self.model[6]), 2.0 * self.half)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Finding:
+    """An accepted segment with its evidence, in the frame of the cloud.
+
+    Parameters
+    ----------
+    segment : Segment
+    points : ndarray of shape (n,)
+        Indices of the points on its surface.
+    support : int
+        Candidates of its cluster.
+    payoff : float
+        Mean payoff of its cluster.
+    coverage : float
+        Angle about the axis that is covered, radians.
+    offset_error, tilt_error : float
+        Standard deviations of the axis, at its middle and in angle.
+    measures : mapping of str to float
+        What the verification measured.
+    """
+
+    segment: Segment
+    points: IndexArray
+    support: int
+    payoff: float
+    coverage: float
+    offset_error: float
+    tilt_error: float
+    measures: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CylinderFit:
+    """A cylinder and the evidence for it.
+
+    Parameters
+    ----------
+    cylinder : Cylinder
+        The shape in scene units; its point is the middle of the visible extent.
+    inliers : int
+        Points of the cloud that carry its label.
+    rmse : float
+        Root mean square of the inliers' distances to the surface, scene units.
+    coverage : float
+        Angle about the axis that the inliers cover, radians, in (0, 2 pi].
+    support : int
+        Candidates in its cluster.
+    payoff : float
+        Mean payoff of the cluster, in [0, 1].
+    evidence : mapping of str to float
+        What the verification measured, by the name of the test.
+    """
+
+    cylinder: Cylinder
+    inliers: int
+    rmse: float
+    coverage: float
+    support: int
+    payoff: float
+    evidence: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Extraction:
+    """All that one run found out about one cloud.
+
+    Parameters
+    ----------
+    cylinders : tuple of CylinderFit
+        Ordered by inliers, descending; the index is the `id`.
+    labels : ndarray of shape (N,), int32
+        Cylinder of each finite point of the cloud, -1 for none.
+    residuals : ndarray of shape (N,), float32
+        Signed distance of each labelled point to its cylinder's surface, scene units, + is outside; NaN without a label.
+    cloud : PointCloud
+        What was looked at.
+    scene : Scene
+        What the cloud says about itself.
+    stages : tuple of StageReport
+        Counts per stage, in order.
+    config : Config
+        The resolved configuration: nothing in it is None that the run depended on.
+    warnings : tuple of str
+        What a user should know before trusting the answer.
+    """
+
+    cylinders: tuple[CylinderFit, ...]
+    labels: NDArray[np.int32]
+    residuals: NDArray[np.float32]
+    cloud: PointCloud
+    scene: Scene
+    stages: tuple[StageReport, ...]
+    config: Config
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,239 @@
+"""Clusters -> cylinders (section 3.4), and the fit of the average to all its points.
+
+The paper stops at the average of the winning candidates. A candidate uses only the points of one slice or window; fitted to all
+points about it, and followed along its axis for as long as the surface goes on, the average reaches the accuracy of a fit to the
+segmented cylinder.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.config import AveragingConfig
+from cylx.geometry.cylinder import cylinder_coordinates
+from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
+from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
+from cylx.records import Candidates, Cluster, Ground, Segment
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+GROWTH_STEPS = 8
+ENOUGH = 6000
+"""Points that suffice while a cylinder grows."""
+MANY = 20000
+"""Points that suffice to judge it; the last fit takes all."""
+DEGREES_LOST = math.cos(math.radians(25.0))
+ARC_BINS = 24
+
+
+def average_cluster(candidates: Candidates, cluster: Cluster, config: AveragingConfig) -> Segment:
+    """Average the candidates of a cluster: eq. 8 for the radius, dual-quaternion iterative blending for the axis.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    cluster : Cluster
+    config : AveragingConfig
+
+    Returns
+    -------
+    Segment
+        The average; its height is that of its candidates along the axis.
+    """
+    points, directions = candidates.points[cluster.members], candidates.directions[cluster.members]
+    weights = cluster.weights
+    lead = directions[int(np.argmax(weights))]
+    directions = np.where((directions @ lead)[:, None] < 0, -directions, directions)
+    # step 1; the frame is moved to the initial point, because blending depends on the origin
+    origin = weights @ points
+    direction = weights @ directions
+    direction /= np.linalg.norm(direction)
+    motions, _, _ = line_screws(np.zeros(3), direction, points - origin, directions)
+    motion = blend(motions, weights, config.max_iterations)
+    axis = turn_vectors(motion, direction)
+    axis /= np.linalg.norm(axis)
+    point = move_points(motion, np.zeros(3)) + origin
+    heights = (points - point) @ axis
+    margin = 0.4 * float(np.median(candidates.extents[cluster.members]))
+    low, high = float(heights.min()) - margin, float(heights.max()) + margin
+    model = np.concatenate([point + 0.5 * (low + high) * axis, axis, [weights @ candidates.radii[cluster.members]]])
+    return Segment(model, 0.5 * (high - low), 0.0)
+
+
+def refine(segment: Segment, ground: Ground) -> Segment | str:
+    """Fit a rough cylinder to the cloud and let it grow along its axis until the surface ends.
+
+    Parameters
+    ----------
+    segment : Segment
+        The start.
+    ground : Ground
+        The cloud.
+
+    Returns
+    -------
+    Segment or str
+        The fitted cylinder with its visible extent, or why there is none.
+    """
+    model, half, noise = segment.model, segment.half, ground.noise
+    first = model
+    for step in range(GROWTH_STEPS):
+        beyond = max(1.5 * model[6], 0.7 * half) if step else 0.5 * model[6]
+        shell = max(0.12 * model[6] if step == 0 else 0.05 * model[6], 5.0 * noise)
+        width = shell + 8.0 * noise
+        points = _own_points(ground, model, half + beyond, width)
+        if len(points) < 20:
+            return "too few points"
+        stride = max(1, len(points) // ENOUGH)
+        kernel = Kernel(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+        fit = fit_cylinder(points[::stride], model, low=-half, high=half, kernel=kernel, steps=12 if step else 25)
+        if fit is None:
+            return "no fit"
+        model, spread = fit
+        if not (0.5 * first[6] <= model[6] <= 2.0 * first[6]) or abs(model[3:6] @ first[3:6]) < DEGREES_LOST:
+            return "drifted away"
+        spread = TUKEY_SPREAD * spread
+        heights, distances, angles = cylinder_coordinates(points, model[:3], model[3:6])
+        on = np.abs(distances - model[6]) < 3.0 * min(max(spread, noise), 2.0 * noise)
+        found = visible_extent(heights[on], angles[on], half, model[6])
+        if found is None:
+            return "too few points"
+        low, high = found
+        before = half
+        half = 0.5 * (high - low)
+        model[:3] += 0.5 * (low + high) * model[3:6]
+        if half < 0.1 * model[6]:
+            return "too short"
+        if step and abs(half - before) < 0.01 * before + 0.01 * model[6]:
+            break
+    return refit(Segment(model, half, noise), ground, most=MANY)
+
+
+def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment | str:
+    """Fit a cylinder to its points between its ends, to the fixed point of the robust estimate.
+
+    Parameters
+    ----------
+    segment : Segment
+    ground : Ground
+    most : int, optional
+        Points that suffice; all by default.
+
+    Returns
+    -------
+    Segment or str
+        With the bias of the radius taken off; or why there is none.
+    """
+    noise, half = ground.noise, segment.half
+    width = max(4.0 * noise, 0.02 * segment.model[6])
+    points = _own_points(ground, segment.model, 1.02 * half, 2.0 * width)
+    points = points[:: max(1, len(points) // most)] if most else points
+    kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+    fit = (
+        fit_cylinder(points, segment.model, low=-half, high=half, kernel=kernel, steps=60) if len(points) > 19 else None
+    )
+    if fit is None:
+        return "no fit"
+    model, spread = fit
+    spread *= TUKEY_SPREAD
+    model[6] = unbiased_radius(model[6], min(spread, 0.5 * model[6]))
+    return Segment(model, half, spread)
+
+
+def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
+    """Find the visible extent of a cylinder that is left as the candidates averaged it.
+
+    Parameters
+    ----------
+    segment : Segment
+    ground : Ground
+
+    Returns
+    -------
+    Segment or str
+        The same axis and radius with its own middle, height and spread, or why there is none.
+    """
+    model, radius = segment.model, float(segment.model[6])
+    reach = max(segment.half, radius) * 4.0
+    # the average is as good as its candidates, so its surface is looked for in a wider shell than a fitted one's
+    width = max(5.0 * ground.noise, 0.05 * radius)
+    half = max(segment.half, 0.5 * radius)
+    for _ in range(GROWTH_STEPS):
+        near = ground.cells.near_cylinder(model, -reach, reach, max(0.0, radius - width), radius + width)
+        near = near[ground.may_be_on(near, radius)]
+        heights, distances, angles = cylinder_coordinates(ground.points[near], model[:3], model[3:6])
+        found = visible_extent(heights, angles, half, radius)
+        if found is None:
+            return "too few points"
+        if max(-found[0], found[1]) < 0.95 * reach:
+            break
+        reach *= 2.0
+    low, high = found
+    on = (heights >= low) & (heights <= high)
+    spread = 1.4826 * float(np.median(np.abs(distances[on] - radius)))
+    moved = np.concatenate([model[:3] + 0.5 * (low + high) * model[3:6], model[3:]])
+    return Segment(moved, 0.5 * (high - low), spread)
+
+
+def _own_points(ground: Ground, model: FloatArray, half: float, width: float) -> FloatArray:
+    """Give the points near a cylinder's surface that do not belong to something much flatter."""
+    near = ground.cells.near_cylinder(model, -half, half, max(0.0, model[6] - width), model[6] + width)
+    return ground.points[near[ground.may_be_on(near, model[6])]]
+
+
+def visible_extent(
+    heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float = 0.35
+) -> tuple[float, float] | None:
+    """Find how far a surface goes on, by pieces of its height in which its arc is filled.
+
+    Density alone would follow a can along the table it touches; what counts is the share of the arc's angles that are filled.
+
+    Parameters
+    ----------
+    heights, angles : ndarray of shape (n,)
+        Cylinder coordinates of the points on the surface.
+    half : float
+        The arc is taken from the points with heights within this.
+    radius : float
+    filled : float
+        A piece belongs if it fills this share of what the median piece fills.
+
+    Returns
+    -------
+    low, high : float
+        Heights of the ends, None if fewer than 15 points are there.
+    """
+    core = np.abs(heights) <= half
+    if core.sum() < 15:
+        return None
+    bins = ((angles / (2 * np.pi) + 0.5) * ARC_BINS).astype(np.int64) % ARC_BINS
+    counts = np.bincount(bins[core], minlength=ARC_BINS)
+    arc = counts > max(0.5, 0.15 * float(np.median(counts[counts > 0])))
+    on = arc[bins]
+    density = float((core & on).sum()) / (2.0 * half)
+    if density <= 0.0:
+        return None
+    piece = max(0.25 * radius, 12.0 / density)
+    index = np.floor(heights[on] / piece).astype(np.int64)
+    first = int(index.min())
+    index -= first
+    pieces = int(index.max()) + 1
+    occupied = np.zeros((pieces, ARC_BINS), np.bool_)
+    occupied[index, bins[on]] = True
+    share = occupied.sum(axis=1) / arc.sum()
+    centers = (np.arange(pieces) + first + 0.5) * piece
+    inside = share[np.abs(centers) <= half + 0.5 * piece]
+    usual = float(np.median(inside[inside > 0])) if (inside > 0).any() else 1.0
+    good = np.flatnonzero(share >= filled * usual)
+    if len(good) == 0:
+        return None
+    gap = max(3.0 * radius, 12.0 / density) / piece
+    runs = np.split(good, np.flatnonzero(np.diff(good) > gap + 1) + 1)
+    overlaps = [min(centers[run[-1]] + 0.5 * piece, half) - max(centers[run[0]] - 0.5 * piece, -half) for run in runs]
+    best = runs[int(np.argmax(overlaps))]
+    own = heights[on][(index >= best[0]) & (index <= best[-1])]
+    return float(own.min()), float(own.max())

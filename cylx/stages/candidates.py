@@ -1,0 +1,158 @@
+"""Ellipse fits -> candidates: the two cylinders that cut a plane in an ellipse, and their polish on the points about them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.config import CandidatesConfig
+from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place
+from cylx.geometry.morton import cell_starts, gather_ball, thin
+from cylx.records import Candidates, EllipseFit, Frame
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+CAPACITY = 4096
+"""Most points a candidate is polished on."""
+
+
+def axes_of(fit: EllipseFit) -> FloatArray:
+    """Give the two possible axis directions of an ellipse (eq. 4): the normal turned about the minor axis by +-arccos(b / a).
+
+    Returns
+    -------
+    ndarray of shape (2, 3)
+    """
+    ratio = fit.ellipse.semi_minor / fit.ellipse.semi_major
+    major = fit.ellipse.major_axis
+    minor = fit.plane.lift_vectors(np.array([-major[1], major[0]]))
+    x, y, z = minor
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    turn = np.eye(3) + math.sqrt(max(0.0, 1.0 - ratio * ratio)) * cross + (1.0 - ratio) * cross @ cross  # eq. 4
+    return np.stack([turn @ fit.plane.normal, turn.T @ fit.plane.normal])
+
+
+def propose_cylinders(slices: list[list[EllipseFit]]) -> Candidates:
+    """Make two candidates of each ellipse: its centre, its semi-minor axis, and the two directions of eq. 4.
+
+    Parameters
+    ----------
+    slices : list of list of EllipseFit
+        The ellipses of each slice; all candidates of one slice exclude each other (eq. 5).
+
+    Returns
+    -------
+    Candidates
+    """
+    models, parents, inliers = [], [], []
+    for index, fits in enumerate(slices):
+        for fit in fits:
+            center = fit.plane.lift(fit.ellipse.center)
+            for direction in axes_of(fit):
+                models.append(np.concatenate([center, direction, [fit.ellipse.semi_minor]]))
+                parents.append(index)
+                inliers.append(fit.inliers)
+    count = len(models)
+    return Candidates(
+        np.array(models).reshape(count, 7),
+        np.array(parents, dtype=np.int64),
+        np.zeros(count),
+        np.array(inliers, dtype=np.int64),
+        np.array(models).reshape(count, 7)[:, 6].copy(),
+    )
+
+
+def polish_candidates(
+    candidates: Candidates, frame: Frame, radius_range: tuple[float, float], config: CandidatesConfig
+) -> Candidates:
+    """Fit each candidate to the points within two radii of its centre, and drop those that do not fit.
+
+    Of the two axes of an ellipse only the right one survives this, as a rule.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    frame : Frame
+    radius_range : tuple of float
+        Least and greatest radius, frame units.
+    config : CandidatesConfig
+
+    Returns
+    -------
+    Candidates
+    """
+    rows = np.zeros((len(candidates), 9))
+    rows[:, :7] = candidates.models
+    kept = np.zeros(len(candidates), np.bool_)
+    octave = np.log2(np.maximum(candidates.radii / frame.window, 1.0)).astype(np.int64)
+    for level in np.unique(octave):
+        sample = thin(frame.codes, frame.voxel_level + int(level))
+        cells, starts = cell_starts(frame.codes[sample], frame.voxel_level + int(level) + 3)
+        side = frame.unit * 2.0 ** (frame.voxel_level + int(level) + 3)
+        which = np.flatnonzero(octave == level)
+        part, good = rows[which], np.zeros(len(which), np.bool_)
+        _polish(
+            frame.points[sample], cells, starts, side, frame.noise, *radius_range, config.min_inliers, config.min_share, part, good
+        )  # fmt: skip
+        rows[which], kept[which] = part, good
+    return Candidates(
+        rows[kept, :7].copy(),
+        candidates.parents[kept],
+        rows[kept, 8].copy(),
+        rows[kept, 7].astype(np.int64),
+        candidates.windows[kept],
+    )
+
+
+@njit(cache=True, nogil=True)
+def _polish(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    noise: float,
+    least: float,
+    greatest: float,
+    min_inliers: int,
+    min_share: float,
+    rows: FloatArray,
+    kept: NDArray[np.bool_],
+) -> None:
+    found, around = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3))
+    matrix, right, axes = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
+    quality, bins = np.empty(4), np.empty(36, np.int64)
+    center = np.empty(3)
+    for c in range(len(rows)):
+        model = rows[c, :7]
+        first = model[6]
+        for d in range(3):
+            center[d] = model[d]
+            model[d] = 0.0
+        n = gather_ball(points, cells, starts, side, center, 2.0 * first, found)
+        for a in range(n):
+            for d in range(3):
+                around[a, d] = points[found[a], d] - center[d]
+        floor = max(3.0 * noise, 0.01 * first)
+        spread = fit_in_place(
+            around, n, model, -math.inf, math.inf, max(0.3 * first, 4.0 * noise), floor, 0.6, math.inf, 10, matrix, right, axes
+        )  # fmt: skip
+        if (
+            spread < 0.0
+            or spread > 0.34 * floor
+            or not (max(least, 0.5 * first) <= model[6] <= min(greatest, 2.0 * first))
+        ):
+            continue
+        candidate_quality(around, n, model, 3.0 * noise, axes, bins, quality)
+        if quality[0] < min_inliers or quality[0] < min_share * n or quality[1] < 0.5 * model[6]:
+            continue
+        foot = 0.0
+        for d in range(3):
+            foot -= model[d] * model[3 + d]
+        for d in range(3):
+            model[d] += foot * model[3 + d] + center[d]
+        rows[c, 7], rows[c, 8] = quality[0], quality[1]
+        kept[c] = True

@@ -1,0 +1,322 @@
+"""Candidates -> clusters: the game that candidates play (section 3.3).
+
+The paper's payoff and its dynamics over all candidates, or the same game at scale: a sparse payoff over the pairs within reach and
+local populations, one neighbourhood after the other.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.config import ClusteringConfig
+from cylx.game import SparsePayoff, evolve
+from cylx.geometry.dual_quaternions import pairwise_screw_distances
+from cylx.records import Candidates, Cluster, Segment, StageReport
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+CUT = 0.1
+"""Local payoffs below this are zero."""
+REACH = 4.0
+"""Candidates play against those within this many radii, or their own extent if that is more."""
+MEMBER = 0.35
+"""Everybody whose payoff against the equilibrium exceeds this share of the mean belongs to the cluster."""
+CROWD = 400
+"""Most candidates of a local population, the best connected ones."""
+
+
+WITNESS = 0.4
+"""Windows below this many radii see dents and rims of real objects rather than the cylinder."""
+
+
+class CandidateGame:
+    """All candidates and their payoffs; gives one cluster after the other.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    config : ClusteringConfig
+    """
+
+    def __init__(self, candidates: Candidates, config: ClusteringConfig) -> None:
+        self._config = config
+        self._candidates = candidates
+        self._alive = np.ones(len(candidates), np.bool_)
+        self._dropped = {"too small": 0, "too little payoff": 0}
+        self._clusters = 0
+        if config.kernel == "screw":
+            self._payoff: SparsePayoff = _dense_to_sparse(screw_payoff(candidates, config))
+        else:
+            self._payoff = local_payoff(candidates, config)
+        self._degrees = self._payoff.degrees()
+        self._heap = [(-degree, i) for i, degree in enumerate(self._degrees.tolist())]
+        heapq.heapify(self._heap)
+
+    def next_cluster(self) -> Cluster | None:
+        """Play until a cluster emerges; its members are out of the game afterwards. None when nobody is left."""
+        whole = self._config.population == "whole"
+        while True:
+            nodes = np.flatnonzero(self._alive) if whole else self._neighbourhood()
+            if nodes is None or len(nodes) == 0:
+                return None
+            block = self._payoff.block(nodes)
+            if whole or self._config.diagonal:
+                np.fill_diagonal(block, self._config.diagonal)
+            population = evolve(
+                block,
+                dynamics=self._config.dynamics,
+                max_iterations=self._config.max_iterations,
+                tolerance=self._config.tolerance,
+            )
+            fitness = block @ population
+            mean = float(population @ fitness)
+            # the paper's winners are those with a share; here also whoever does well against them
+            members = population > (0.0 if not whole else 1.0 / len(nodes) * 1e-3)
+            if not whole:
+                members |= fitness > MEMBER * mean
+            self.withdraw(nodes[members])
+            support = int(members.sum())
+            if support < self._config.min_support:
+                self._dropped["too small"] += 1
+                if whole:
+                    return None
+            elif mean < self._config.min_payoff:
+                self._dropped["too little payoff"] += 1
+                if whole:
+                    return None
+            else:
+                self._clusters += 1
+                weights = population[members] + (0.0 if whole else 0.05 * population.max())
+                return Cluster(nodes[members], weights / weights.sum(), mean)
+
+    def withdraw(self, indices: IndexArray) -> None:
+        """Take candidates out of the game: rows and columns zeroed (section 3.5)."""
+        for i in indices[self._alive[indices]]:
+            self._alive[i] = False
+            columns, values = self._payoff.row(i)
+            self._degrees[columns] -= values
+
+    def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
+        """Give the candidates still in the game that a cylinder accounts for, or that say closely the same."""
+        near, distance = _near(self._candidates, segment)
+        limits = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
+        return np.flatnonzero(self._alive & near & _agree(self._candidates, segment, distance, *limits))
+
+    def report(self) -> StageReport:
+        """Count the candidates that came in, the clusters, and what was dropped."""
+        dropped = {name: count for name, count in self._dropped.items() if count}
+        return StageReport("clustering", len(self._candidates), self._clusters, dropped)
+
+    def _neighbourhood(self) -> IndexArray | None:
+        """Give the best connected candidate that is left, and those it plays with."""
+        least = 0.5 * self._config.min_payoff * (self._config.min_support - 1)
+        while self._heap:
+            degree, i = heapq.heappop(self._heap)
+            if not self._alive[i]:
+                continue
+            if -degree > self._degrees[i] + 1e-9:
+                heapq.heappush(self._heap, (-float(self._degrees[i]), i))
+                continue
+            if self._degrees[i] < least:
+                return None
+            self._alive[i] = False  # whatever comes of it, it is not asked again
+            columns, values = self._payoff.row(i)
+            present = self._alive[columns]
+            columns, values = columns[present], values[present]
+            if len(columns) >= CROWD:
+                columns = columns[np.argsort(-values, kind="stable")[: CROWD - 1]]
+            self._alive[i] = True
+            self.withdraw(np.array([i]))
+            return np.concatenate(([i], columns)).astype(np.int64)
+        return None
+
+
+def agreement(windows: Candidates, segment: Segment) -> tuple[int, int]:
+    """Count the windows inside a cylinder that agree with it, and all of them.
+
+    An edge of a beam borrows the few hypotheses that happen to agree; of a pipe's nearly all do.
+
+    Parameters
+    ----------
+    windows : Candidates
+        Drawn evenly over the surface.
+    segment : Segment
+
+    Returns
+    -------
+    consistent, near : int
+    """
+    near, distance = _near(windows, segment)
+    near &= (distance < segment.model[6]) & (windows.windows > WITNESS * segment.model[6])
+    consistent = near & _agree(windows, segment, distance, 0.15, 6.0, 0.1)
+    return int(consistent.sum()), int(near.sum())
+
+
+def _near(candidates: Candidates, segment: Segment) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Tell which candidates lie along a cylinder's height and a radius more, and how far from its axis."""
+    offsets = candidates.points - segment.model[:3]
+    heights = offsets @ segment.model[3:6]
+    distance = np.linalg.norm(offsets - heights[:, None] * segment.model[3:6], axis=1)
+    return np.abs(heights) < segment.half + segment.model[6], distance
+
+
+def _agree(
+    candidates: Candidates, segment: Segment, distance: FloatArray, offset: float, angle_deg: float, radius: float
+) -> NDArray[np.bool_]:
+    """Tell which candidates agree with a cylinder: offset in its radii, angle, relative radius."""
+    model = segment.model
+    cosine = np.abs(candidates.directions @ model[3:6])
+    return np.asarray(
+        (distance < offset * model[6])
+        & (np.abs(candidates.radii / model[6] - 1.0) < radius)
+        & (cosine > math.cos(math.radians(angle_deg))),
+        dtype=np.bool_,
+    )
+
+
+def screw_payoff(candidates: Candidates, config: ClusteringConfig) -> FloatArray:
+    """Give the paper's payoff (eq. 2, 5 and 6) of all pairs, shape (M, M).
+
+    Lengths are measured in the median radius of the candidates and from the middle of their points: eq. 1 mixes radians with
+    lengths and depends on the origin, and so the paper's own experiments, a cylinder of radius 1 at the origin, are met exactly.
+    """
+    if len(candidates) == 0:
+        return np.zeros((0, 0))
+    scale = float(np.median(candidates.radii))
+    middle = np.median(candidates.points, axis=0)
+    points = (candidates.points - middle) / scale
+    radii = candidates.radii / scale
+    distance, gap = pairwise_screw_distances(points, candidates.directions)
+    ratio = np.minimum.outer(radii, radii) / np.maximum.outer(radii, radii)
+    compatible = (gap < np.add.outer(radii, radii)) & (ratio > config.min_radius_ratio)
+    compatible &= candidates.parents[:, None] != candidates.parents[None, :]
+    return np.where(compatible, np.exp(-distance / config.screw_scale), 0.0)
+
+
+def local_payoff(candidates: Candidates, config: ClusteringConfig) -> SparsePayoff:
+    """Give the payoffs of all pairs within reach: angle, offset at the candidates in radii, ratio of radii.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    config : ClusteringConfig
+
+    Returns
+    -------
+    SparsePayoff
+        exp(-sqrt((angle / a)^2 + (offset / o)^2 + ((1 - ratio) / p)^2)) where it exceeds 0.1, else nothing.
+    """
+    order = np.argsort(candidates.radii, kind="stable")
+    models = np.ascontiguousarray(candidates.models[order])
+    parents, extents = candidates.parents[order], candidates.extents[order]
+    least_ratio = max(config.min_radius_ratio, 1.0 + math.log(CUT) * config.radius)
+    widths = math.radians(config.angle_deg), config.offset, config.radius
+    counts = np.zeros(len(models) + 1, np.int64)
+    nothing = np.empty(0, np.int64), np.empty(0)
+    _pairs(models, parents, extents, least_ratio, *widths, counts[1:], np.empty(0, np.int64), *nothing, False)
+    pointers = np.cumsum(counts)
+    columns, values = np.empty(pointers[-1], np.int64), np.empty(pointers[-1])
+    _pairs(models, parents, extents, least_ratio, *widths, counts[1:], pointers[:-1].copy(), columns, values, True)
+    # back from the order of radii to the order of the candidates
+    rows = order[np.repeat(np.arange(len(models)), counts[1:])]
+    columns = order[columns]
+    sort = np.lexsort((columns, rows))
+    starts = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(models))))).astype(np.int64)
+    return SparsePayoff(starts, columns[sort], values[sort])
+
+
+@njit(cache=True, nogil=True)
+def _pairs(
+    models: FloatArray,
+    parents: IndexArray,
+    extents: FloatArray,
+    least_ratio: float,
+    angle: float,
+    offset: float,
+    radius: float,
+    counts: IndexArray,
+    ends: IndexArray,
+    columns: IndexArray,
+    values: FloatArray,
+    fill: bool,
+) -> None:
+    """Count the pairs of each row, or fill them in at `ends`; the models come by ascending radius."""
+    bound = -math.log(CUT)
+    sine = math.sin(min(1.5, bound * angle))
+    for i in range(len(models)):
+        for j in range(i + 1, len(models)):
+            ratio = models[i, 6] / models[j, 6]
+            if ratio < least_ratio:
+                break
+            mean = 0.5 * (models[i, 6] + models[j, 6])
+            reach = max(REACH * mean, max(extents[i], extents[j]))
+            dx, dy, dz = models[j, 0] - models[i, 0], models[j, 1] - models[i, 1], models[j, 2] - models[i, 2]
+            square = dx * dx + dy * dy + dz * dz
+            if square > reach * reach or parents[i] == parents[j]:
+                continue
+            cx = models[i, 4] * models[j, 5] - models[i, 5] * models[j, 4]
+            cy = models[i, 5] * models[j, 3] - models[i, 3] * models[j, 5]
+            cz = models[i, 3] * models[j, 4] - models[i, 4] * models[j, 3]
+            turn = math.sqrt(cx * cx + cy * cy + cz * cz)
+            if turn > sine:
+                continue
+            a = dx * models[i, 3] + dy * models[i, 4] + dz * models[i, 5]
+            b = dx * models[j, 3] + dy * models[j, 4] + dz * models[j, 5]
+            shift = 0.5 * (math.sqrt(max(0.0, square - a * a)) + math.sqrt(max(0.0, square - b * b))) / mean
+            strangeness = (math.asin(min(1.0, turn)) / angle) ** 2 + (shift / offset) ** 2
+            strangeness += ((1.0 - ratio) / radius) ** 2
+            if strangeness > bound * bound:
+                continue
+            if fill:
+                value = math.exp(-math.sqrt(strangeness))
+                columns[ends[i]], values[ends[i]] = j, value
+                columns[ends[j]], values[ends[j]] = i, value
+                ends[i] += 1
+                ends[j] += 1
+            else:
+                counts[i] += 1
+                counts[j] += 1
+
+
+def _dense_to_sparse(payoff: FloatArray) -> SparsePayoff:
+    rows, columns = np.nonzero(payoff)
+    pointers = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(payoff))))).astype(np.int64)
+    return SparsePayoff(pointers, columns.astype(np.int64), payoff[rows, columns])
+
+
+def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:
+    """Keep the best supported few of the candidates that say the same: same place within half a radius, same radius and direction.
+
+    A large cylinder has thousands of equal candidates; the game needs enough of them to tell it from chance, not all.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    most : int
+        Candidates kept in each cell of place (half a radius), radius (a quarter) and direction (half a radian).
+
+    Returns
+    -------
+    Candidates
+    """
+    if len(candidates) == 0:
+        return candidates
+    octave = np.floor(np.log(candidates.radii) / math.log(1.25))
+    side = 0.5 * 1.25**octave
+    signs = np.where(
+        candidates.directions[np.arange(len(candidates)), np.abs(candidates.directions).argmax(1)] < 0, -1, 1
+    )
+    key = np.column_stack(
+        [octave, np.floor(candidates.points / side[:, None]), np.round(2.0 * candidates.directions * signs[:, None])]
+    ).astype(np.int64)
+    order = np.lexsort((-candidates.inliers, *key.T))
+    same = (key[order][1:] == key[order][:-1]).all(axis=1)
+    starts = np.flatnonzero(np.concatenate(([True], ~same)))
+    rank = np.arange(len(order)) - np.repeat(starts, np.diff(np.concatenate((starts, [len(order)]))))
+    return candidates.take(np.sort(order[rank < most]))

@@ -1,0 +1,261 @@
+"""Frame -> candidates: the second source beside the paper's slices.
+
+The paper leaves open where candidates come from (section 3.2). A window that is small against a cylinder holds a piece of a
+quadric, whose curvatures give the cylinder (`cylx.geometry.quadric`). Windows of all sizes are tried, coarse to fine; what is flat
+in a large window is not looked at again in smaller ones.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.config import CandidatesConfig
+from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place
+from cylx.geometry.morton import cell_starts, gather_ball, thin
+from cylx.geometry.quadric import fit_plane, osculating_cylinder
+from cylx.records import Candidates, Frame, StageReport
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+CAPACITY = 2048
+"""Most points of a window; thinned windows over one surface hold about 600."""
+FEW_SEEDS = 3000
+"""Octaves with fewer windows than this get them more closely."""
+FLAT_SHARE = 0.9
+"""Share of a window's points within three noises of its plane that makes it flat."""
+OUTCOMES = ("too few points", "flat", "no curvature", "does not fit", "badly supported", "kept")
+COLUMNS = 10
+"""Numbers a window fills in: the model (7), inliers, extent, spread."""
+
+
+def find_curved_windows(
+    frame: Frame, radius_range: tuple[float, float], config: CandidatesConfig, threads: int
+) -> tuple[Candidates, FloatArray, StageReport]:
+    """Propose a cylinder for each window whose points are curved one way.
+
+    Parameters
+    ----------
+    frame : Frame
+    radius_range : tuple of float
+        Least and greatest radius, frame units.
+    config : CandidatesConfig
+    threads : int
+        Does not change the result.
+
+    Returns
+    -------
+    candidates : Candidates
+    flatness : ndarray of shape (N,)
+        Radius of the largest flat window that holds the point, 0 if there is none.
+    report : StageReport
+    """
+    flatness = np.zeros(len(frame.points))
+    parts: list[Candidates] = []
+    counts = np.zeros(len(OUTCOMES), np.int64)
+    for radius in reversed(window_radii(frame, config.octave)):
+        level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window)))
+        kept = thin(frame.codes, level, flatness == 0)
+        if len(kept) < 25:
+            continue
+        points, codes = frame.points[kept], frame.codes[kept]
+        seeds = _choose_seeds(codes, level, kept)
+        rows, outcome, planes = _look(frame, points, codes, level, seeds, radius, radius_range, config, threads)
+        counts += np.bincount(outcome, minlength=len(OUTCOMES))
+        flat = outcome == 1
+        if flat.any():
+            _mark_flat(frame, frame.points[kept[seeds[flat]]], planes[flat], radius, flatness)
+        good = rows[outcome == 5]
+        parts.append(
+            Candidates(
+                good[:, :7].copy(),
+                np.arange(len(good)),
+                good[:, 8].copy(),
+                good[:, 7].astype(np.int64),
+                np.full(len(good), radius),
+            )
+        )
+    found = Candidates.joined(parts)
+    rejected = {name: int(n) for name, n in zip(OUTCOMES[:5], counts[:5], strict=True) if n}
+    return found, flatness, StageReport("curvature", int(counts.sum()), len(found), rejected)
+
+
+def window_radii(frame: Frame, octave: float) -> list[float]:
+    """Give the radii of the windows, ascending, up to an eighth of the cloud's extent."""
+    extent = float(np.linalg.norm(np.ptp(frame.points, axis=0)))
+    steps = max(1, math.ceil(math.log(max(extent / 8.0 / frame.window, 1.0)) / math.log(octave)) + 1)
+    return [frame.window * octave**k for k in range(steps)]
+
+
+def _choose_seeds(codes: IndexArray, level: int, kept: IndexArray) -> IndexArray:
+    """Give indices into the thinned points, one a cell of sixteen voxels, of eight or four where that makes few."""
+    for shift in (4, 3, 2):
+        seeds = thin(codes, level + shift)
+        if len(seeds) >= FEW_SEEDS:
+            break
+    return seeds
+
+
+def _look(
+    frame: Frame,
+    points: FloatArray,
+    codes: IndexArray,
+    level: int,
+    seeds: IndexArray,
+    radius: float,
+    radius_range: tuple[float, float],
+    config: CandidatesConfig,
+    threads: int,
+) -> tuple[FloatArray, IndexArray, FloatArray]:
+    """Look through the windows about all seeds, in chunks over threads."""
+    cells, starts = cell_starts(codes, level + 3)
+    side = frame.unit * 2.0 ** (level + 3)
+    rows, planes = np.zeros((len(seeds), COLUMNS)), np.zeros((len(seeds), 6))
+    outcome = np.zeros(len(seeds), np.int64)
+    chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 64)))
+
+    def work(chunk: IndexArray) -> None:
+        first, last = int(chunk[0]), int(chunk[-1]) + 1
+        _scan(
+            points,
+            cells,
+            starts,
+            side,
+            seeds[first:last],
+            radius,
+            frame.noise,
+            radius_range[0],
+            radius_range[1],
+            config.min_inliers,
+            config.min_share,
+            rows[first:last],
+            outcome[first:last],
+            planes[first:last],
+        )
+
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, chunks))
+    return rows, outcome, planes
+
+
+@njit(cache=True, nogil=True)
+def _scan(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    seeds: IndexArray,
+    radius: float,
+    noise: float,
+    least: float,
+    greatest: float,
+    min_inliers: int,
+    min_share: float,
+    rows: FloatArray,
+    outcome: IndexArray,
+    planes: FloatArray,
+) -> None:
+    found = np.empty(CAPACITY, np.int64)
+    around, inner = np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
+    center, normal, heights = np.empty(3), np.empty(3), np.empty(CAPACITY)
+    matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
+    right, axes = np.empty(6), np.empty((2, 3))
+    quality, bins = np.empty(4), np.empty(36, np.int64)
+    for s in range(len(seeds)):
+        seed = points[seeds[s]]
+        n = gather_ball(points, cells, starts, side, seed, 2.0 * radius, found)
+        m = 0
+        for a in range(n):
+            square = 0.0
+            for d in range(3):
+                around[a, d] = points[found[a], d] - seed[d]
+                square += around[a, d] ** 2
+            if square < radius * radius:
+                for d in range(3):
+                    inner[m, d] = around[a, d]
+                m += 1
+        if m < 12 or n < 20:
+            outcome[s] = 0
+            continue
+        if fit_plane(around, n, noise, center, normal, matrix, vectors) > FLAT_SHARE:
+            outcome[s] = 1
+            for d in range(3):
+                planes[s, d] = center[d] + seed[d]
+                planes[s, 3 + d] = normal[d]
+            continue
+        fit_plane(inner, m, noise, center, normal, matrix, vectors)
+        model = rows[s, :7]
+        outcome[s] = 2
+        if not osculating_cylinder(inner, m, noise, center, normal, model, matrix, right, axes, heights):
+            continue
+        if not (max(0.35 * radius, 4.0 * noise) <= model[6] <= 14.0 * radius):
+            continue
+        floor = max(3.0 * noise, 0.01 * model[6])
+        spread = fit_in_place(
+            around, n, model, -math.inf, math.inf, max(0.3 * model[6], 4.0 * noise), floor, 0.6, math.inf, 10, matrix, right, axes
+        )  # fmt: skip
+        # a Gaussian within the kernel has 0.27 of its width, a uniform background 0.378
+        outcome[s] = 3
+        r = model[6]
+        if spread < 0.0 or spread > 0.34 * floor:
+            continue
+        if not (max(0.3 * radius, 4.0 * noise, least) <= r <= min(16.0 * radius, greatest)):
+            continue
+        candidate_quality(around, n, model, 3.0 * noise, axes, bins, quality)
+        outcome[s] = 4
+        if quality[0] < min_inliers or quality[0] < min_share * n or quality[1] < 0.8 * radius:
+            continue
+        outcome[s] = 5
+        foot = 0.0
+        for d in range(3):
+            foot -= model[d] * model[3 + d]
+        for d in range(3):
+            model[d] += foot * model[3 + d] + seed[d]
+        rows[s, 7], rows[s, 8], rows[s, 9] = quality[0], quality[1], spread
+
+
+def _mark_flat(frame: Frame, seeds: FloatArray, planes: FloatArray, radius: float, flatness: FloatArray) -> None:
+    """Give the points about flat windows, within three noises of their planes, the radius of the window."""
+    level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window))) + 3
+    cells, starts = cell_starts(frame.codes, level)
+    _mark(
+        frame.points,
+        cells,
+        starts,
+        frame.unit * 2.0**level,
+        seeds,
+        planes,
+        2.0 * radius,
+        3.0 * frame.noise,
+        flatness,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _mark(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    seeds: FloatArray,
+    planes: FloatArray,
+    reach: float,
+    width: float,
+    flatness: FloatArray,
+) -> None:
+    found = np.empty(len(points), np.int64)
+    for s in range(len(seeds)):
+        n = gather_ball(points, cells, starts, side, seeds[s], reach, found)
+        for a in range(n):
+            i = found[a]
+            if flatness[i] == 0.0:
+                height = 0.0
+                for d in range(3):
+                    height += (points[i, d] - planes[s, d]) * planes[s, 3 + d]
+                if abs(height) < width:
+                    flatness[i] = reach

@@ -1,0 +1,45 @@
+"""Cloud, cylinders -> labels and residuals: whose each point is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.geometry.cylinder import cylinder_coordinates
+from cylx.records import Ground, Segment
+
+FloatArray = NDArray[np.float64]
+
+
+def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.int32], FloatArray]:
+    """Give each point the cylinder whose surface it is nearest to, within three deviations of it.
+
+    Parameters
+    ----------
+    segments : list of Segment
+    ground : Ground
+        The cloud; points of something much flatter than a cylinder are not its own.
+
+    Returns
+    -------
+    labels : ndarray of shape (N,), int32
+        Index of the segment, -1 for none.
+    residuals : ndarray of shape (N,)
+        Signed distance to that segment's surface, + is outside; NaN for none.
+    """
+    labels = np.full(len(ground.points), -1, np.int32)
+    residuals = np.full(len(ground.points), np.nan)
+    nearest = np.full(len(ground.points), np.inf)
+    for index, segment in enumerate(segments):
+        radius = segment.model[6]
+        reach = 3.0 * max(segment.spread, ground.noise)
+        near = ground.cells.near_cylinder(
+            segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
+        )
+        near = near[ground.may_be_on(near, radius)]
+        _, distances, _ = cylinder_coordinates(ground.points[near], segment.model[:3], segment.model[3:6])
+        offset = distances - radius
+        closer = np.abs(offset) < nearest[near]
+        near, offset = near[closer], offset[closer]
+        labels[near], residuals[near], nearest[near] = index, offset, np.abs(offset)
+    return labels, residuals

@@ -1,0 +1,113 @@
+"""Pieces -> cylinders: one pipe is one cylinder, however many clusters and gaps it came in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
+from cylx.records import Finding, Ground, Segment
+
+FloatArray = NDArray[np.float64]
+
+COSINE = math.cos(math.radians(8.0))
+RADIUS_RATIO = 0.75
+OFFSET = 0.3
+"""Axes further apart than this, in radii, and four standard deviations are those of two pipes."""
+CLAIMED = 0.5
+"""A cylinder that has more than this share of its points in common with better ones is one of them."""
+
+Judge = Callable[[Segment, Finding], Finding | None]
+
+
+def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[Finding]:
+    """Join pairs that one cylinder explains as well as two, until none is left.
+
+    Parameters
+    ----------
+    findings : list of Finding
+        Accepted cylinders.
+    ground : Ground
+        The cloud.
+    judge : callable
+        Refits and verifies a joined segment, in the light of the better of its parts; None if it does not pass.
+
+    Returns
+    -------
+    list of Finding
+        By inliers, descending.
+    """
+    pool = sorted(findings, key=lambda finding: -len(finding.points))
+    i = 0
+    while i < len(pool):
+        j = i + 1
+        while j < len(pool):
+            joined = _join(pool[i], pool[j], ground, judge)
+            if joined is None:
+                j += 1
+            else:
+                pool[i] = joined
+                del pool[j]
+                j = i + 1
+        i += 1
+    return pool
+
+
+def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
+    """Drop the cylinders most of whose points better ones have claimed.
+
+    Parameters
+    ----------
+    findings : list of Finding
+    count : int
+        Points of the cloud.
+    """
+    claimed = np.zeros(count, np.bool_)
+    kept = []
+    for finding in sorted(findings, key=lambda finding: (-len(finding.points) * finding.payoff, -len(finding.points))):
+        if claimed[finding.points].mean() <= CLAIMED:
+            claimed[finding.points] = True
+            kept.append(finding)
+    return kept
+
+
+def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
+    """Fit one cylinder to two pieces; None if it does not explain both."""
+    one, two, noise = a.segment, b.segment, ground.noise
+    if abs(one.model[3:6] @ two.model[3:6]) < COSINE:
+        return None
+    if min(one.model[6], two.model[6]) < RADIUS_RATIO * max(one.model[6], two.model[6]):
+        return None
+    across = two.model[:3] - one.model[:3]
+    height = float(across @ one.model[3:6])
+    apart = float(np.linalg.norm(across - height * one.model[3:6]))
+    error = math.sqrt(a.offset_error**2 + b.offset_error**2 + (a.tilt_error * height) ** 2)
+    gap = abs(height) - one.half - two.half
+    if apart > OFFSET * one.model[6] + 4.0 * error or (
+        gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]
+    ):
+        return None
+    low, high = min(-one.half, height - two.half), max(one.half, height + two.half)
+    model = one.model.copy()
+    model[:3] += 0.5 * (low + high) * model[3:6]
+    half = 0.5 * (high - low)
+    kernel = Kernel(max(0.1 * model[6], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+    union = np.union1d(a.points, b.points)
+    fit = fit_cylinder(ground.points[union], model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=30)
+    if fit is None:
+        return None
+    model, spread = fit
+    spread *= TUKEY_SPREAD
+    if spread > 1.1 * max(one.spread, two.spread, noise):
+        return None
+    width = 3.0 * max(min(spread, 2.0 * noise), noise)
+    for finding, share in ((a, 0.9), (b, 0.8)):
+        offsets = ground.points[finding.points] - model[:3]
+        along = offsets @ model[3:6]
+        distances = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))
+        if (np.abs(distances - model[6]) < width).mean() < share:
+            return None
+    return judge(Segment(model, half, spread), a if a.payoff >= b.payoff else b)

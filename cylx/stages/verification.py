@@ -1,0 +1,318 @@
+"""Cylinders -> accepted, with reasons: measured properties that tell a cylinder from what only looks like one.
+
+Corners of boxes, strips of spheres, cones and pairs of planes give consistent false cylinders. None of the measures needs normals;
+each is reported under its name, whether it decided anything or not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.config import VerificationConfig
+from cylx.geometry.cylinder import cylinder_coordinates
+from cylx.records import Ground, Segment
+
+FloatArray = NDArray[np.float64]
+MaskArray = NDArray[np.bool_]
+
+PIECES = 10
+"""Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
+TRUNCATED = 0.9866
+"""Standard deviation of a Gaussian cut off at three sigmas."""
+SECTORS = 36
+MANY = 20000
+"""Points on the surface that suffice for the measures."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Verdict:
+    """What the verification measured of a segment.
+
+    Parameters
+    ----------
+    reasons : tuple of str
+        Names of the tests it failed; empty if it is accepted.
+    measures : dict of str to float
+        Name to value.
+    coverage : float
+        Angle about the axis that is covered, radians.
+    points : ndarray of shape (n,)
+        Indices of the points within three deviations of the surface that may belong to it.
+    offset_error, tilt_error : float
+        Standard deviations of the axis, at its middle and in angle: frame units, radians.
+    """
+
+    reasons: tuple[str, ...]
+    measures: dict[str, float]
+    coverage: float
+    points: NDArray[np.int64]
+    offset_error: float = math.inf
+    tilt_error: float = math.inf
+
+    @property
+    def accepted(self) -> bool:
+        """Whether no test failed."""
+        return not self.reasons
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shell:
+    """The points about a segment in its own coordinates.
+
+    Parameters
+    ----------
+    indices : ndarray of shape (n,)
+        Which points of the cloud they are.
+    heights, residuals, angles : ndarray of shape (n,)
+        Heights in half heights (so in [-1, 1]), signed distances to the surface, angles about the axis.
+    on : ndarray of shape (n,), bool
+        Points on the surface that may belong to it.
+    flat : ndarray of shape (n,), bool
+        Points of something much flatter than the segment.
+    deviation : float
+        Standard deviation the surface was cut out with.
+    """
+
+    indices: NDArray[np.int64]
+    heights: FloatArray
+    residuals: FloatArray
+    angles: FloatArray
+    on: MaskArray
+    flat: MaskArray
+    deviation: float
+
+    def thinned(self, stride: int) -> Shell:
+        """Give every so manyth point: shares and shapes stay, and cost what they should."""
+        arrays = (self.indices, self.heights, self.residuals, self.angles, self.on, self.flat)
+        return Shell(*(array[::stride] for array in arrays), self.deviation)
+
+
+def look_at(segment: Segment, ground: Ground) -> Shell:
+    """Collect the points in and about a segment."""
+    model, half, noise = segment.model, segment.half, ground.noise
+    deviation = max(min(segment.spread, 2.0 * noise), noise)
+    near = ground.cells.near_cylinder(model, -half, half, 0.0, model[6] + max(0.5 * model[6], 10.0 * deviation))
+    heights, distances, angles = cylinder_coordinates(ground.points[near], model[:3], model[3:6])
+    residuals = distances - model[6]
+    flat = ~ground.may_be_on(near, model[6])
+    on = (np.abs(residuals) < 3.0 * deviation) & ~flat
+    return Shell(near, heights / max(half, 1e-300), residuals, angles, on, flat, deviation)
+
+
+def verify(
+    segment: Segment, ground: Ground, payoff: float, agreement: tuple[int, int], config: VerificationConfig
+) -> Verdict:
+    """Measure a segment and judge it.
+
+    Parameters
+    ----------
+    segment : Segment
+        Fitted.
+    ground : Ground
+        The cloud.
+    payoff : float
+        Mean payoff of its cluster.
+    agreement : tuple of int
+        Curvature windows along it that agree with it, and all of them.
+    config : VerificationConfig
+
+    Returns
+    -------
+    Verdict
+    """
+    whole = look_at(segment, ground)
+    noise = ground.noise
+    points = whole.indices[whole.on]
+    count = len(points)
+    shell = whole.thinned(max(1, count // MANY))
+    coverage, sectors = covered_angle(shell.angles[shell.on])
+    if count < 20:
+        return Verdict(("too few points",), {}, coverage, points)
+    radius, half = float(segment.model[6]), segment.half
+    residuals = shell.residuals[shell.on]
+    deviation = float(np.sqrt((residuals**2).mean())) / TRUNCATED
+    shape = _shape(shell, segment, deviation)
+    lack, structure = _lack_of_fit(shell, deviation)
+    inside, outside = _emptiness(shell, radius)
+    consistent, near = agreement
+    measures = {
+        "noise_ratio": deviation / noise,
+        "lack_of_fit": lack,
+        "structure": structure / noise,
+        "inside": inside,
+        "outside": outside,
+        "tangent": _tangent(shell, sectors, radius),
+        "curvature": shape["curvature"],
+        "slope": shape["slope"],
+        "bulge": shape["bulge"],
+        "height_radii": 2.0 * half / radius,
+        "agreement": consistent / near if near else 1.0,
+    }
+    reasons = _judge(measures, shape, count, coverage, payoff, agreement, radius, noise, config)
+    return Verdict(reasons, measures, coverage, points, shape["offset_error"], shape["tilt_error"])
+
+
+def _judge(
+    measures: dict[str, float],
+    shape: dict[str, float],
+    count: int,
+    coverage: float,
+    payoff: float,
+    agreement: tuple[int, int],
+    radius: float,
+    noise: float,
+    config: VerificationConfig,
+) -> tuple[str, ...]:
+    """Give the names of the tests that fail."""
+    # real objects deviate from a cylinder by about a hundredth of the radius; few points cannot claim that for themselves
+    form = max(0.85 * noise, 0.01 * radius) if count >= 200 and payoff >= 0.4 else 0.3 * noise
+    consistent, near = agreement
+    share = consistent / near if near else 1.0
+    error = math.sqrt(max(share * (1.0 - share), 0.05) / near) if near else 1.0
+    limits = config.model_dump()
+
+    def above(limit: str, value: float) -> bool:
+        return limits[limit] is not None and value > limits[limit]
+
+    failed = {
+        "too few points": count < config.min_inliers * (0.5 if payoff >= 0.5 else 1.0),
+        "coverage": coverage < math.radians(config.min_coverage_deg),
+        "height": measures["height_radii"] < config.min_height,
+        "noise": config.max_noise_ratio is not None
+        and (measures["noise_ratio"] * noise) ** 2 > (config.max_noise_ratio * noise) ** 2 + form**2,
+        "lack of fit": above("max_lack_of_fit", measures["lack_of_fit"]) and measures["structure"] * noise > form,
+        "inside": above("max_inside", measures["inside"]),
+        "outside": above("max_outside", measures["outside"]),
+        "tangent": above("max_tangent", measures["tangent"]),
+        "curvature": config.min_curvature is not None and measures["curvature"] < config.min_curvature,
+        "slope": config.max_slope is not None
+        and abs(measures["slope"]) > config.max_slope + 3.0 * shape["slope_error"],
+        "bulge": config.max_bulge is not None
+        and (abs(measures["bulge"]) > config.max_bulge + 3.0 * shape["bulge_error"] or shape["bulge_error"] > 0.3),
+        "agreement": config.min_agreement is not None and share + error < config.min_agreement,
+        "payoff": payoff < 0.4 and count >= 300,
+    }
+    return tuple(name for name, bad in failed.items() if bad)
+
+
+def covered_angle(angles: FloatArray) -> tuple[float, MaskArray]:
+    """Give the angle that points cover about an axis, and which of the sectors do.
+
+    A sector counts if it holds at least 15 % of what a typical filled one does.
+    """
+    if len(angles) == 0:
+        return 0.0, np.zeros(SECTORS, np.bool_)
+    counts = np.bincount(_sector(angles), minlength=SECTORS)
+    filled = counts > max(0.5, 0.15 * float(np.median(counts[counts > 0])))
+    return float(filled.sum()) * 2.0 * math.pi / SECTORS, filled
+
+
+def _sector(angles: FloatArray) -> NDArray[np.int64]:
+    return ((angles / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
+
+
+def _shape(shell: Shell, segment: Segment, deviation: float) -> dict[str, float]:
+    """Measure what the residuals say of the shape: curvature against a plane, slope and bulge along the axis, with errors."""
+    radius, half = float(segment.model[6]), segment.half
+    z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
+    cosine, sine = np.cos(angles), np.sin(angles)
+    design = np.column_stack([cosine, sine, z * cosine, z * sine, np.ones_like(z), z, z * z - (z * z).mean()])
+    gram = design.T @ design
+    gram[np.diag_indices(7)] *= 1.0 + 1e-12
+    covariance = np.linalg.pinv(gram[:5, :5], hermitian=True) * deviation**2
+    wider = np.linalg.pinv(gram, hermitian=True)
+    terms = wider @ (design.T @ residuals)
+    errors = np.sqrt(np.maximum(np.diag(wider), 0.0)) * deviation
+    return {
+        "curvature": radius / math.sqrt(max(float(covariance[4, 4]), 1e-300)),
+        "offset_error": math.sqrt(max(float(covariance[0, 0] + covariance[1, 1]), 0.0)),
+        "tilt_error": math.sqrt(max(float(covariance[2, 2] + covariance[3, 3]), 0.0)) / half,
+        "slope": float(terms[5]) / half,
+        "slope_error": float(errors[5]) / half,
+        "bulge": -2.0 * float(terms[6]) * radius / half**2,
+        "bulge_error": 2.0 * float(errors[6]) * radius / half**2,
+    }
+
+
+def _lack_of_fit(shell: Shell, deviation: float) -> tuple[float, float]:
+    """Give chi-square per cell of the mean residuals over the surface, and the rms of what is structure in them."""
+    z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
+    rows = int(np.clip(len(z) / 60, 3, 8))
+    cell = ((angles / (2.0 * np.pi) + 0.5) * 24).astype(np.int64) % 24 * rows
+    cell += np.clip(((z + 1.0) / 2.0 * rows).astype(np.int64), 0, rows - 1)
+    counts = np.bincount(cell, minlength=24 * rows)
+    sums = np.bincount(cell, residuals, minlength=24 * rows)
+    full = counts >= 4
+    if full.sum() <= 6:
+        return 1.0, 0.0
+    squares = float((sums[full] ** 2 / counts[full]).sum())
+    variance = deviation**2
+    excess = max(0.0, (squares - float(full.sum()) * variance) / float(counts[full].sum()))
+    return squares / variance / max(int(full.sum()) - 5, 1), math.sqrt(excess)
+
+
+def _emptiness(shell: Shell, radius: float) -> tuple[float, float]:
+    """Give points inside and just outside as shares of those on the surface, medians over pieces of the height.
+
+    Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
+    """
+    piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES).astype(np.int64), 0, PIECES - 1)
+    outer = max(0.5 * radius, 10.0 * shell.deviation)
+    on = np.abs(shell.residuals) < 3.0 * shell.deviation
+    inside = shell.residuals < -4.0 * shell.deviation
+    outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
+    counts = [np.bincount(piece[mask], minlength=PIECES) for mask in (on, inside, outside)]
+    full = counts[0] >= 1
+    if not full.any():
+        return 1.0, 1.0
+    return (
+        float(np.median(counts[1][full] / counts[0][full])),
+        float(np.median(counts[2][full] / counts[0][full])),
+    )
+
+
+def _tangent(shell: Shell, filled: MaskArray, radius: float) -> float:
+    """Give the density of points that go on tangentially past both ends of the arc, as a share of the arc's own.
+
+    A rounded edge of a box goes on as its two sides; a pipe ends.
+    """
+    closed = filled.copy()
+    for _ in range(2):  # gaps of up to two sectors are not ends
+        for step in (1, 2):
+            closed |= np.roll(closed, 1) & np.roll(closed, -step)
+    if closed.all() or not closed.any():
+        return 0.0
+    start, length = _longest_run(closed)
+    if length >= SECTORS - 3:
+        return 0.0
+    middle = np.abs(shell.heights) <= 0.8
+    width = 2.0 * math.pi / SECTORS
+    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
+    counts = np.bincount(_sector(shell.angles[on]), minlength=SECTORS)
+    density = max(float(counts[(start + np.arange(length)) % SECTORS].sum()) / length, 1e-9)
+    low = -math.pi + start * width
+    reach = math.radians(40.0)
+    shares = []
+    for end, sign in ((low, -1.0), (low + length * width, 1.0)):
+        past = (sign * (shell.angles - end) + math.pi) % (2.0 * math.pi) - math.pi
+        top = radius * (1.0 / np.cos(np.clip(past + math.radians(10.0), 0.0, reach)) - 1.0) + 4.0 * shell.deviation
+        along = middle & (past > 0) & (past < reach) & (shell.residuals > -3.0 * shell.deviation)
+        shares.append(float((along & (shell.residuals < top)).sum()) / (reach / width) / density)
+    return min(shares)
+
+
+def _longest_run(filled: MaskArray) -> tuple[int, int]:
+    """Give start and length of the longest cyclic run of True; not all are True."""
+    best = (0, 0)
+    count = len(filled)
+    for start in np.flatnonzero(filled & ~np.roll(filled, 1)):
+        length = 0
+        while length < count and filled[(start + length) % count]:
+            length += 1
+        if length > best[1]:
+            best = (int(start), length)
+    return best
