@@ -94,7 +94,7 @@ def read_json(path: str | Path) -> dict[str, Any]:
     except UnicodeDecodeError:
         raise InputError(place, "not JSON: not UTF-8 text", "give a JSON file as cylx writes it") from None
     except (ValueError, RecursionError) as error:
-        fault = "nested too deeply" if isinstance(error, RecursionError) else _lowered(str(error))
+        fault = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(place, f"not JSON: {fault}", "give a JSON file as cylx writes it") from None
     if not isinstance(document, dict):
         raise InputError(place, "holds no JSON object", "give a JSON file as cylx writes it")
@@ -140,7 +140,7 @@ def _measure(stream: BinaryIO, place: str, copy: IO[bytes] | None = None) -> tup
     if copy is not None:
         copy.flush()
     if size == 0:
-        raise InputError(place, "is empty", "give a file with points")
+        raise InputError(place, "is empty", "check how it was made")
     return size, digest.hexdigest()
 
 
