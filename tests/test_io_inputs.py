@@ -3,6 +3,7 @@
 import hashlib
 import io
 import os
+import sys
 import threading
 
 import numpy as np
@@ -40,6 +41,11 @@ def test_standard_input_is_read_like_a_file(sample, monkeypatch, told):
     assert cloud.table.tolist() == from_file.table.tolist()
     assert (cloud.source.file, cloud.source.format) == ("-", sample.suffix[1:])
     assert cloud.source.sha256 == from_file.source.sha256
+
+
+def test_no_format_needs_open3d_as_we_write_it(sample, monkeypatch):
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    assert np.array_equal(read_cloud(sample).points, POINTS)
 
 
 @pytest.mark.parametrize("suffix", ["", ".dat", ".txt", ".XYZ"])
