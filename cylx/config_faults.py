@@ -11,7 +11,14 @@ from pydantic import BaseModel, ValidationError
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-_RANGES = {"greater_than": ">", "greater_than_equal": ">=", "less_than": "<", "less_than_equal": "<="}
+_LIMITS = {
+    "greater_than": ("gt", "out of range", "it must be > {:g}"),
+    "greater_than_equal": ("ge", "out of range", "it must be >= {:g}"),
+    "less_than": ("lt", "out of range", "it must be < {:g}"),
+    "less_than_equal": ("le", "out of range", "it must be <= {:g}"),
+    "too_short": ("min_length", "too short", "it must have {} or more entries"),
+    "too_long": ("max_length", "too long", "it must have {} or fewer entries"),
+}
 _KINDS = {
     "bool": ("true or false", "write true or false without quotes"),
     "int": ("an integer", "write digits alone"),
@@ -19,7 +26,6 @@ _KINDS = {
     "finite": ("a finite number", "write a number such as 0.05"),
     "string": ("a word", "put it in quotes"),
     "list": ("a list", "write [a, b]"),
-    "too": ("long enough", "give at least one entry"),
     "model": ("a section", "write its keys below it, indented"),
     "dict": ("a section", "write its keys below it, indented"),
 }
@@ -50,7 +56,7 @@ def describe_fault(error: ValidationError, model: type[BaseModel]) -> tuple[tupl
 def dotted_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     """List the dotted path of every key of a model, sections before their keys."""
     for name, field in model.model_fields.items():
-        yield prefix + name
+        yield prefix + (field.alias or name)
         if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
             yield from dotted_keys(field.annotation, f"{prefix}{name}.")
 
@@ -62,9 +68,9 @@ def _fault_and_remedy(details: ErrorDetails, path: tuple[str, ...], model: type[
         return ("unknown key", _suggest_key(path, model)) if kind == "extra_forbidden" else ("is missing", "add it")
     if kind == "literal_error":
         return f"{_show(value)} is not one of its values", _suggest_value(value, str(context["expected"]))
-    if kind in _RANGES:
-        bound = context[{">": "gt", ">=": "ge", "<": "lt", "<=": "le"}[_RANGES[kind]]]
-        return f"{_show(value)} is out of range", f"it must be {_RANGES[kind]} {bound:g}"
+    if kind in _LIMITS:
+        limit, fault, remedy = _LIMITS[kind]
+        return f"{_show(value)} is {fault}", remedy.format(context[limit])
     if kind == "value_error":
         fault, _, remedy = str(context["error"]).partition("; ")
         return fault, remedy

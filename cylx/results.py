@@ -44,7 +44,7 @@ class Bounds(Part):
 
 
 class Input(Part):
-    """What was looked at."""
+    """The cloud that was looked at."""
 
     file: str
     """Name of the file without its folder; `-` for standard input, `<array>` for an array."""
@@ -59,7 +59,7 @@ class Input(Part):
 
 
 class SceneScale(Part):
-    """What the cloud says about itself."""
+    """The scale of the cloud."""
 
     spacing: Length
     """Typical distance of neighbouring points on a surface, scene units."""

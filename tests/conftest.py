@@ -58,9 +58,10 @@ def make_extraction():
 
     def make(cloud=None, config=None, *, cylinders=2):
         cloud = PointCloud(POINTS) if cloud is None else cloud
+        shapes = [Cylinder((0, 0, 2), (0, 0, 1), i + 1.0, 4.0) for i in range(cylinders)]
         fits = [
-            CylinderFit(Cylinder((0, 0, 2), (0, 0, 1), i + 1.0, 4.0), 24 - i, 0.25, 2 * np.pi, 3, 0.5, {"slope": 0.125})
-            for i in range(cylinders)
+            CylinderFit(shape, max(24 - i, 1), 0.25, 2 * np.pi, 3, 0.5, {"slope": 0.125})
+            for i, shape in enumerate(shapes)
         ]
         return Extraction(
             cylinders=tuple(fits),

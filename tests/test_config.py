@@ -172,7 +172,7 @@ REFUSED = [
     ("preset: on", "my.yaml: preset: 'on' is not one of its values; choose auto or paper"),
     ("preset: papre", "my.yaml: preset: 'papre' is not one of its values; did you mean 'paper'?"),
     ("candidates: {sources: slices}", "my.yaml: candidates.sources: 'slices' is not a list; write [a, b]"),
-    ("candidates: {sources: []}", "my.yaml: candidates.sources: [] is not long enough; give at least one entry"),
+    ("candidates: {sources: []}", "my.yaml: candidates.sources: [] is too short; it must have 1 or more entries"),
     ("slicing: 3", "my.yaml: slicing: 3 is not a section; write its keys below it, indented"),
     ("seed: [1]", "my.yaml: seed: [1] is not an integer; write digits alone"),
     ("scene: {noise: {a: 1}}", "my.yaml: scene.noise: a section is not a number; write a number such as 0.05"),
@@ -267,7 +267,7 @@ def test_a_file_that_may_not_be_read_is_named(monkeypatch):
         raise PermissionError(errno.EACCES, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)
-    with pytest.raises(ConfigError, match="^my.yaml: cannot be read: Permission denied; give a readable YAML file$"):
+    with pytest.raises(ConfigError, match=r"^my\.yaml: cannot be read: Permission denied; give a readable YAML file$"):
         load_config(path="my.yaml")
 
 

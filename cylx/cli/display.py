@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cylx.records import CylinderFit, Extraction
 
 _MOST_ROWS = 20
-_WIDE_ENOUGH = 200
+_NARROWEST, _WIDE_ENOUGH = 80, 200
 _COMPILING = "compiling (the first time only)"
 
 
@@ -49,9 +49,9 @@ class Conversation:
         if self.quiet or not sys.stderr.isatty():
             yield SilentObserver()
             return
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(24), TextColumn("{task.fields[count]}"))
         with Progress(*columns, TimeElapsedColumn(), console=_console(sys.stderr), transient=True) as display:
             yield ProgressObserver(display)
 
@@ -89,17 +89,22 @@ class ProgressObserver:
     def __init__(self, display: Progress) -> None:
         self.display = display
         self.task: TaskID | None = None
+        self.done = 0
+        self.total: int | None = None
 
     def stage_started(self, name: str, total: int | None) -> None:
         """Show a stage in the place of the one before."""
         if self.task is not None:
             self.display.remove_task(self.task)
-        self.task = self.display.add_task(_COMPILING if name == "compiling" else name, total=total)
+        self.task = self.display.add_task(_COMPILING if name == "compiling" else name, total=total, count="")
+        self.done, self.total = 0, total
 
     def stage_advanced(self, steps: int) -> None:
         """Move the bar."""
         if self.task is not None:
-            self.display.advance(self.task, steps)
+            self.done += steps
+            count = f"{self.done}" if self.total is None else f"{self.done}/{self.total}"
+            self.display.update(self.task, advance=steps, count=count)
 
     def stage_finished(self, name: str, seconds: float) -> None:
         """Leave the line until the next stage starts."""
@@ -148,7 +153,7 @@ def show_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, err: boo
     from rich.table import Table
     from rich.text import Text
 
-    table = Table(box=box.SIMPLE, pad_edge=False)
+    table = Table(box=box.SIMPLE, pad_edge=False, padding=(0, 1, 0, 0))
     for i, name in enumerate(header):
         numeric = bool(rows) and all(row[i][:1] in "+-.0123456789" for row in rows)
         table.add_column(Text(name), justify="right" if numeric else "left", no_wrap=numeric)
@@ -157,7 +162,7 @@ def show_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, err: boo
     console = _console(sys.stderr if err else sys.stdout)
     with console.capture() as capture:
         console.print(table)
-    text = capture.get().strip("\n")
+    text = "\n".join(filter(None, (line.rstrip() for line in capture.get().splitlines())))
     if err:
         tell(text)
     else:
@@ -169,8 +174,7 @@ def _console(stream: object) -> Console:
     from rich.console import Console
 
     console = Console(file=stream, soft_wrap=False)  # type: ignore[arg-type]
-    if not console.is_terminal:
-        console.width = _WIDE_ENOUGH
+    console.width = max(console.width, _NARROWEST) if console.is_terminal else _WIDE_ENOUGH
     return console
 
 
@@ -180,7 +184,7 @@ _CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "pa
 def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
     """Write one line of the table of cylinders."""
     shape = fit.cylinder
-    direction = " ".join(f"{x:.3f}" for x in shape.direction)
+    direction = " ".join(f"{x:.3f}".replace("-0.000", "0.000") for x in shape.direction)
     numbers = [f"{shape.radius:.5g}", f"{shape.height:.4g}", f"{fit.coverage * 57.29577951308232:.0f}°"]
     return [str(index), *numbers, str(fit.inliers), f"{fit.rmse:.3g}", f"{fit.payoff:.2f}", direction]
 

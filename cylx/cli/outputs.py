@@ -82,13 +82,13 @@ def check_apart(inputs: Sequence[str], outputs: Sequence[str]) -> None:
     UsageError
         If two are the same.
     """
-    taken = {os.path.realpath(name): "is an input" for name in inputs if name != STREAM}
+    taken = {os.path.realpath(name): "is an input as well as an output" for name in inputs if name != STREAM}
     for name in outputs:
         key = name if name == STREAM else os.path.realpath(name)
         if key in taken:
             place = "standard output" if name == STREAM else name
-            raise UsageError(place, f"{taken[key]} as well as an output", "choose another name")
-        taken[key] = "is another output"
+            raise UsageError(place, taken[key], "choose another name")
+        taken[key] = "is asked for by two outputs"
 
 
 def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool) -> None:
@@ -140,7 +140,7 @@ def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str |
     """Name the outputs of one scan."""
     stem = "stdin" if scan == STREAM else Path(scan).stem
     if output is None:
-        result = STREAM if scan == STREAM else str(Path(scan).with_name(stem + RESULT))
+        result = STREAM if scan == STREAM else str(Path(scan).parent / (stem + RESULT))
     elif output != STREAM and (Path(output).is_dir() or output.endswith(("/", os.sep))):
         result = str(Path(output) / (stem + RESULT))
     else:
@@ -156,7 +156,7 @@ def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str |
         return Job(scan, result, folder_and_stem + ANNOTATED)
     if scan == STREAM:
         raise UsageError("--annotate", "the annotated cloud has no name", "give one by --annotated FILE")
-    return Job(scan, result, str(Path(scan).with_name(stem + ANNOTATED)))
+    return Job(scan, result, str(Path(scan).parent / (stem + ANNOTATED)))
 
 
 def _check_batch(scans: Sequence[str], output: str | None, annotated: str | None) -> None:

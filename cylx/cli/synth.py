@@ -44,19 +44,25 @@ class Vector(VectorType):
 
 def output_options(command: Command) -> Command:
     """Add what both scenes have in common: where it lies, and how it is written."""
-    for option in (
-        debug_option,
-        overwrite_option,
-        click.option(
-            "--precision", type=click.Choice(["double", "single"]), default="double", show_default=True,
-            help="Of the coordinates in the file.",
-        ),
-        click.option("--offset", type=Vector(), default="0,0,0", help="Move the scene, in its unit after --scale."),
-        click.option("--scale", type=float, default=1.0, show_default=True, help="Enlarge the scene by a factor."),
-        click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Seed of all chance."),
-    ):  # fmt: skip
+    for option in (debug_option, overwrite_option, *_OUTPUT):
         command = option(command)
     return command
+
+
+_OUTPUT: tuple[Callable[[Any], Any], ...] = (
+    click.option(
+        "--precision",
+        type=click.Choice(["double", "single"]),
+        default="double",
+        show_default=True,
+        help="Of the coordinates in the file.",
+    ),
+    click.option("--offset", type=Vector(), default="0,0,0", help="Move the scene, in its unit after --scale."),
+    click.option("--scale", type=float, default=1.0, show_default=True, help="Enlarge the scene by a factor."),
+    click.option(
+        "--seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Seed of all chance."
+    ),
+)
 
 
 @click.group(cls=ExampleGroup, examples=["cylx synth single can.ply --theta 90", "cylx synth multi room.pcd --seed 7"])

@@ -1,0 +1,92 @@
+"""`cylx.extract`: the same as the command, in one call."""
+
+import numpy as np
+import pytest
+
+import cylx
+from cylx.config import load_config
+from cylx.errors import ConfigError, InputError
+from cylx.records import PointCloud, SilentObserver
+from cylx.synthetic import single
+
+
+@pytest.fixture
+def asked(monkeypatch, make_extraction):
+    """Put a pipeline in place that remembers what it is asked."""
+    calls = []
+
+    def remember(cloud, config, **others):
+        calls.append((cloud, config, others))
+        return make_extraction(cloud, config)
+
+    monkeypatch.setattr("cylx.api.extract_cylinders", remember)
+    return calls
+
+
+@pytest.mark.parametrize("kind", [np.asarray, np.ndarray.tolist, PointCloud, lambda points: points.astype("f4")])
+def test_points_come_in_any_form(asked, kind):
+    points = np.arange(12.0).reshape(4, 3)
+    cylx.extract(kind(points))
+    ((cloud, config, others),) = asked
+    assert np.array_equal(cloud.points, points)
+    assert config == load_config()
+    assert others["threads"] is None
+    assert isinstance(others["observer"], SilentObserver)
+
+
+@pytest.mark.parametrize("kind", [str, lambda path: path])
+def test_a_path_is_read(asked, scan, kind):
+    cylx.extract(kind(scan))
+    ((cloud, _, _),) = asked
+    assert (cloud.source.file, cloud.source.format, len(cloud.points)) == (str(scan), "xyz", 24)
+
+
+def test_a_cloud_is_taken_as_it_is(asked):
+    cloud = PointCloud(np.zeros((1, 3)))
+    cylx.extract(cloud)
+    assert asked[0][0] is cloud
+
+
+def test_rows_that_are_not_finite_stay_rows(asked):
+    cylx.extract([[0, 0, 0], [np.nan, 0, 0]])
+    assert (len(asked[0][0].points), asked[0][0].rows) == (1, 2)
+
+
+def test_options_are_those_of_the_command(asked, tmp_path):
+    (tmp_path / "my.yaml").write_text("preset: paper\nslicing: {min_points: 9}")
+    options = {"seed": 3, "radius": (None, 2.0), "max_cylinders": 4, "planes": 7, "overrides": ["slicing.thickness=1"]}
+    cylx.extract([[0, 0, 0]], config=tmp_path / "my.yaml", threads=2, **options)
+    expected = load_config(
+        preset="paper",
+        overrides=["slicing.thickness=1", "slicing.min_points=9"],
+        options={"seed": 3, "scene.radius_max": 2.0, "max_cylinders": 4, "slicing.planes": 7},
+    )
+    assert asked[0][1] == expected
+    assert asked[0][2]["threads"] == 2
+
+
+def test_a_configuration_can_be_handed_over_and_changed(asked):
+    settings = load_config(preset="paper", overrides=["slicing.planes=7"])
+    cylx.extract([[0, 0, 0]], config=settings)
+    cylx.extract([[0, 0, 0]], config=settings, seed=5)
+    assert asked[0][1] == settings
+    assert asked[1][1] == settings.model_copy(update={"seed": 5})
+
+
+def test_faults_are_errors_of_cylx(tmp_path):
+    with pytest.raises(ConfigError, match="scene: radius_min 3 is above radius_max 1; swap them"):
+        cylx.extract([[0, 0, 0]], radius=(3, 1))
+    with pytest.raises(InputError, match="no such file"):
+        cylx.extract(tmp_path / "none.ply")
+    with pytest.raises(ValueError, match=r"points must have shape \(N, 3\), not \(2,\)"):
+        cylx.extract([1.0, 2.0])
+
+
+def test_the_one_line_finds_a_cylinder():
+    scene = single(points=4000, height=3.0, sigma=0.005, seed=2)
+    found = cylx.extract(scene.points, max_cylinders=1, seed=1)
+    (fit,) = found.cylinders
+    assert fit.cylinder.radius == pytest.approx(1.0, abs=5 * 0.005 / np.sqrt(4000) + 0.005**2)
+    assert abs(fit.cylinder.direction[2]) == pytest.approx(1.0, abs=1e-6)
+    assert found.config.seed == 1
+    assert len(found.labels) == 4000

@@ -1,0 +1,113 @@
+"""The whole chain with nothing faked: make a scene, find its cylinders, judge them, compare runs, stop midway."""
+
+import json
+import os
+import subprocess
+import sys
+
+import jsonschema
+import numpy as np
+import pytest
+from plyfile import PlyData
+
+from cylx.results import result_schema
+
+STAGES = ["reading", "scene", "curvature", "slicing", "candidates", "clustering", "averaging", "labelling", "writing"]
+INTERRUPT = """
+import cylx.cli.stopwatch, signal, os
+class Interrupted(cylx.cli.stopwatch.Stopwatch):
+    def stage_started(self, name, total):
+        if name == {stage!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+        super().stage_started(name, total)
+cylx.cli.stopwatch.Stopwatch = Interrupted
+"""
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    """A room with three cylinders and other things."""
+    from click.testing import CliRunner
+
+    from cylx.cli import main
+
+    path = tmp_path_factory.mktemp("room") / "room.ply"
+    options = ["--points", "20000", "--cylinders", "3", "--coverage", "200", "--sigma", "0.001", "--seed", "3"]
+    assert CliRunner().invoke(main, ["synth", "multi", str(path), *options]).exit_code == 0
+    return path
+
+
+@pytest.fixture
+def scan(room, tmp_path):
+    """The room in a folder of its own."""
+    path = tmp_path / "room.ply"
+    path.write_bytes(room.read_bytes())
+    return path
+
+
+def test_cylinders_are_found_written_and_judged(run_cylx, room, scan):
+    done = run_cylx("extract", scan, "--require", 3)
+    assert (done.exit_code, done.stdout) == (0, "")
+    content = json.loads(scan.with_suffix(".cylinders.json").read_bytes())
+    jsonschema.validate(content, result_schema())
+    assert all(value is not None for value in content["config"]["scene"].values())
+    vertices = PlyData.read(scan.with_suffix(".annotated.ply"))["vertex"]
+    assert len(vertices) == 20000
+    counts = np.bincount(vertices["cylinder_id"] + 1)[1:]
+    assert counts.tolist() == [cylinder["inliers"] for cylinder in content["cylinders"]]
+    truth = room.with_suffix(".truth.json")
+    judged = run_cylx("evaluate", scan.with_suffix(".cylinders.json"), truth, "--min-f1", 1, "--max-angle", 0.5)
+    assert judged.exit_code == 0, judged.stdout
+
+
+def test_the_same_bytes_come_out_whatever_the_threads(run_cylx, scan, tmp_path):
+    for threads in (1, 3):
+        options = ["-o", tmp_path / f"{threads}.json", "--no-annotate", "--threads", threads]
+        assert run_cylx("extract", scan, *options).exit_code == 0
+    assert (tmp_path / "1.json").read_bytes() == (tmp_path / "3.json").read_bytes()
+    assert run_cylx("diff", tmp_path / "1.json", tmp_path / "3.json").exit_code == 0
+
+
+def test_a_result_can_be_had_again_from_its_configuration(run_cylx, scan, tmp_path):
+    run_cylx("extract", scan, "--no-annotate", "--max-cylinders", 2, "--seed", 1)
+    first = json.loads(scan.with_suffix(".cylinders.json").read_bytes())
+    (tmp_path / "again.yaml").write_text(json.dumps(first["config"]))
+    again = json.loads(run_cylx("extract", scan, "-o", "-", "-c", tmp_path / "again.yaml").stdout)
+    assert again["config"] == first["config"]
+    assert len(again["cylinders"]) == 2
+    (tmp_path / "again.json").write_text(json.dumps(again))
+    assert run_cylx("diff", scan.with_suffix(".cylinders.json"), tmp_path / "again.json").exit_code == 0
+
+
+def test_the_paper_runs_too(run_cylx, tmp_path):
+    run_cylx("synth", "single", tmp_path / "can.xyz", "--points", 4000)
+    done = run_cylx("extract", tmp_path / "can.xyz", "--preset", "paper", "--planes", 20, "--max-cylinders", 1)
+    assert done.exit_code == 0
+    limits = ["--max-angle", 3, "--max-radius-error", 0.05, "--min-f1", 1]
+    judged = run_cylx("evaluate", tmp_path / "can.cylinders.json", tmp_path / "can.truth.json", *limits)
+    assert judged.exit_code == 0, judged.stdout
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
+@pytest.mark.parametrize("stage", STAGES)
+def test_an_interrupt_in_any_stage_leaves_nothing_behind(spawn_cylx, scan, stage):
+    stopped = spawn_cylx("extract", scan, prelude=INTERRUPT.format(stage=stage))
+    assert (stopped.returncode, stopped.stdout, stopped.stderr) == (130, b"", b"cylx: interrupted\n")
+    assert [path.name for path in scan.parent.iterdir()] == ["room.ply"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no broken pipes")
+def test_a_reader_that_goes_away_ends_it_quietly(scan):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-m", "cylx", "extract", str(scan), "-o", "-", "-q"]
+    stopped = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, check=False)
+    os.close(writer)
+    assert (stopped.returncode, stopped.stderr) == (141, b"")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there is no such shell")
+def test_pipes_can_be_built_of_it(scan):
+    line = f'cat "{scan}" | "{sys.executable}" -m cylx extract - -q | head -n 2'
+    piped = subprocess.run(["/bin/sh", "-c", line], capture_output=True, check=True)
+    assert (piped.stdout, piped.stderr) == (b'{\n  "schema": "cylx.cylinders/1",\n', b"")

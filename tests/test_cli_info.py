@@ -1,0 +1,68 @@
+"""`cylx info`: what is in a file."""
+
+import json
+
+import numpy as np
+import pytest
+
+from cylx.io import write_cloud
+from cylx.synthetic import single
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return single(points=2000, seed=1)
+
+
+def test_it_shows_what_is_in_a_file(run_cylx, tmp_path, scene):
+    path = tmp_path / "can.ply"
+    write_cloud(path, scene.points, properties={"intensity": np.arange(2000, dtype=np.uint16)})
+    shown = run_cylx("info", path)
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    facts = {line[:9].strip(): line[9:] for line in shown.stdout.splitlines()}
+    assert list(facts) == ["file", "format", "points", "fields", "min", "max", "size", "extent", "spacing", "noise"]
+    assert facts["points"] == "2000, 2000 of them finite"
+    assert facts["fields"] == "x (float64), y (float64), z (float64), intensity (uint16)"
+    assert float(facts["noise"]) == pytest.approx(scene.sigma, rel=0.2)
+
+
+def test_json_has_the_same(run_cylx, tmp_path, scene):
+    path = tmp_path / "can.xyz"
+    write_cloud(path, scene.points, properties=None)
+    shown = run_cylx("info", path, "--json")
+    facts = json.loads(shown.stdout)
+    assert (facts["file"], facts["format"], facts["points"], facts["finite"]) == (str(path), "xyz", 2000, 2000)
+    assert facts["bounds"]["min"] == pytest.approx(scene.points.min(axis=0).tolist(), abs=1e-6)
+    assert facts["size"] == pytest.approx(np.ptp(scene.points, axis=0).tolist(), abs=1e-6)
+    assert facts["extent"] == pytest.approx(float(np.linalg.norm(np.ptp(scene.points, axis=0))), abs=1e-6)
+    assert set(facts["scene"]) == {"spacing", "noise"}
+
+
+def test_standard_input_will_do(run_cylx, tmp_path, scene):
+    write_cloud(tmp_path / "can.ply", scene.points, properties=None)
+    shown = run_cylx("info", "-", input=(tmp_path / "can.ply").read_bytes())
+    assert shown.stdout.splitlines()[:2] == ["file     -", "format   ply"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "finite", "fault"),
+    [
+        (["1 1 1"] * 9, 9, "all points are equal"),
+        ([f"{i} 0 0" for i in range(9)], 9, "all points lie on one line"),
+        (["0 0 0", "1 2 3", "2 0 1"], 3, "only 3 usable points"),
+    ],
+)
+def test_a_cloud_without_shape_is_shown_with_a_warning(run_cylx, tmp_path, lines, finite, fault):
+    path = tmp_path / "odd.xyz"
+    path.write_text("\n".join(lines))
+    shown = run_cylx("info", path)
+    assert shown.exit_code == 0
+    assert shown.stderr == f"warning: {path}: {fault}; cylinders cannot be looked for in it\n"
+    assert f"{len(lines)}, {finite} of them finite" in shown.stdout
+    assert "spacing" not in shown.stdout
+
+
+def test_a_missing_file_is_named(run_cylx, tmp_path):
+    failed = run_cylx("info", tmp_path / "none.ply")
+    line = f"cylx: {tmp_path / 'none.ply'}: no such file; check the path\n"
+    assert (failed.exit_code, failed.stdout, failed.stderr) == (3, "", line)
