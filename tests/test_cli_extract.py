@@ -178,6 +178,13 @@ def test_what_exists_is_refused_before_computing(run_cylx, scan, fake_pipeline, 
     assert names(scan.parent) == sorted([existing, "scan.xyz"])
 
 
+def test_the_profile_must_not_be_another_output(run_cylx, scan):
+    for options in (["-o", "-", "--profile", "-"], ["--profile", scan.with_name("scan.cylinders.json")]):
+        failed = run_cylx("extract", scan, *options)
+        assert (failed.exit_code, failed.stdout) == (2, "")
+        assert "is asked for by two outputs" in failed.stderr
+
+
 def test_overwrite_replaces_it(run_cylx, scan):
     scan.with_name("scan.cylinders.json").write_text("old")
     assert run_cylx("extract", scan, "--overwrite").exit_code == 0

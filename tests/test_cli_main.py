@@ -157,17 +157,36 @@ def test_a_failure_is_one_line_and_its_exit_code(failure, code, line):
     assert (first, last) == ("Traceback (most recent call last):", line)
 
 
+def test_debug_may_come_before_the_command(run_cylx, tmp_path):
+    for args in (["--debug", "info", tmp_path / "none.ply"], ["info", "--debug", tmp_path / "none.ply"]):
+        assert run_cylx(*args).stderr.startswith("Traceback (most recent call last):\n")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+def test_a_name_that_cannot_be_printed_is_no_failure(spawn_cylx, tmp_path, encoding):
+    path = tmp_path / os.fsdecode("\N{SNOWMAN}".encode() + (b"\xff" if sys.platform == "linux" else b""))
+    path.write_text("seed: 1")
+    done = spawn_cylx("config", "check", path, env={**os.environ, "PYTHONIOENCODING": encoding})
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout.endswith(b": valid, preset auto\n")
+
+
+def test_a_shell_can_complete_commands(spawn_cylx):
+    shown = spawn_cylx(env={**os.environ, "_CYLX_COMPLETE": "bash_complete", "COMP_WORDS": "cylx e", "COMP_CWORD": "1"})
+    assert shown.stdout.split() == [b"plain,extract", b"plain,evaluate"]
+
+
 def test_a_reader_that_went_away_is_no_news():
     failed = CliRunner().invoke(failing(BrokenPipeError()), ["fail"])
     assert (failed.exit_code, failed.output) == (141, "")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
-def test_a_full_disk_behind_standard_output_is_named(spawn_cylx):
+@pytest.mark.parametrize("args", [["config", "schema"], ["--version"], ["extract", "--help"]], ids=" ".join)
+def test_a_full_disk_behind_standard_output_is_named(args):
+    command = [sys.executable, "-m", "cylx", *args]
     with Path("/dev/full").open("wb") as full:
-        failed = subprocess.run(
-            [sys.executable, "-m", "cylx", "config", "schema"], stdout=full, stderr=subprocess.PIPE, check=False
-        )
+        failed = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, check=False)
     line = b"cylx: standard output: cannot be written: No space left on device; free some space, or write to a file\n"
     assert (failed.returncode, failed.stderr) == (4, line)
 

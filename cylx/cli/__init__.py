@@ -9,6 +9,7 @@ import click
 
 from cylx import __version__
 from cylx.cli.group import LazyGroup
+from cylx.cli.options import debug_option
 
 
 @click.group(
@@ -25,6 +26,7 @@ from cylx.cli.group import LazyGroup
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(__version__, prog_name="cylx", message="%(prog)s %(version)s")
+@debug_option
 def main() -> None:
     """Find every cylinder in a point cloud that has no normals.
 

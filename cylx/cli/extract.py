@@ -63,7 +63,7 @@ def extract(
     """
     jobs = plan_jobs(scans, output, annotate, annotated)
     extras = [] if profile is None else [profile]
-    check_apart([*scans, *(name for job in jobs for name in job.outputs)], extras)
+    check_apart(scans, [*(name for job in jobs for name in job.outputs), *extras])
     check_outputs(jobs, extras, overwrite=overwrite)
     run = Run(settings, threads, require, overwrite, talk)
     try:

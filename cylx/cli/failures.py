@@ -38,8 +38,9 @@ class Failures:
         self, kind: type[BaseException] | None, failure: BaseException | None, trace: TracebackType | None
     ) -> None:
         unwritten = flush_answer()
-        failure = failure or unwritten
-        if failure is None or isinstance(failure, _PASSED_ON):
+        if failure is None or isinstance(failure, _PASSED_ON) or (unwritten and isinstance(failure, OSError)):
+            failure = unwritten  # click's own writing fails as an OSError that does not say where
+        if failure is None:
             return
         if self.context is not None and self.context.meta.get(DEBUG):
             tell("".join(traceback.format_exception(failure)).rstrip())
@@ -96,8 +97,9 @@ def answer(text: str) -> None:
     """
     if sys.stdout is None:
         raise OutputError("standard output", "is closed", "open it, or write to a file")
+    encoding = sys.stdout.encoding or "utf-8"
     try:
-        click.echo(text, nl=False)
+        click.echo(text.encode(encoding, "backslashreplace").decode(encoding), nl=False)
     except BrokenPipeError:
         raise
     except OSError as error:

@@ -44,7 +44,8 @@ class Vector(VectorType):
 
 def output_options(command: Command) -> Command:
     """Add what both scenes have in common: where it lies, and how it is written."""
-    for option in (debug_option, overwrite_option, *_OUTPUT):
+    command = debug_option(overwrite_option(command))
+    for option in _OUTPUT:
         command = option(command)
     return command
 
