@@ -38,8 +38,10 @@ class Failures:
         self, kind: type[BaseException] | None, failure: BaseException | None, trace: TracebackType | None
     ) -> None:
         unwritten = flush_answer()
-        if failure is None or isinstance(failure, _PASSED_ON) or (unwritten and isinstance(failure, OSError)):
-            failure = unwritten  # click's own writing fails as an OSError that does not say where
+        if failure is None or isinstance(failure, _PASSED_ON):
+            failure = unwritten
+        elif isinstance(failure, OSError) and _raised_by_click(trace):
+            failure = failure if isinstance(failure, BrokenPipeError) else _unwritten(failure)
         if failure is None:
             return
         if self.context is not None and self.context.meta.get(DEBUG):
@@ -116,6 +118,12 @@ def flush_answer() -> BrokenPipeError | OutputError | None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return error if isinstance(error, BrokenPipeError) else _unwritten(error)
     return None
+
+
+def _raised_by_click(trace: TracebackType | None) -> bool:
+    """Say whether it was click that failed to write, its help or version, which goes to standard output."""
+    frames = [frame for frame, _ in traceback.walk_tb(trace)]
+    return bool(frames) and frames[-1].f_globals.get("__name__") == "click.utils"
 
 
 def _unwritten(error: OSError) -> OutputError:
