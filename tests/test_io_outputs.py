@@ -209,3 +209,9 @@ def test_a_cloud_on_standard_output_is_a_ply(monkeypatch):
     monkeypatch.setattr("sys.stdout", stream)
     write_cloud("-", POINTS)
     assert stream.buffer.getvalue().startswith(b"ply\nformat binary_little_endian 1.0\nelement vertex 2\n")
+
+
+def test_small_outputs_need_no_large_libraries():
+    code = "import sys; from cylx.io import check_writable, read_json, write_text; print('numpy' in sys.modules)"
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
+    assert ran.stdout.strip() == b"False"

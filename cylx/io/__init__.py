@@ -1,17 +1,42 @@
-"""Files in, files out: the only room that knows paths, formats, and the libraries that read and write them."""
+"""Files in, files out: the only room that knows paths, formats, and the libraries that read and write them.
 
-from cylx.io.annotated import cylinder_colors, write_annotated
-from cylx.io.clouds import read_cloud, write_cloud
-from cylx.io.inputs import read_json
-from cylx.io.outputs import check_writable, write_bytes, write_text
+The names are resolved when they are first used: to write a text takes no numpy.
+"""
 
-__all__ = [
-    "check_writable",
-    "cylinder_colors",
-    "read_cloud",
-    "read_json",
-    "write_annotated",
-    "write_bytes",
-    "write_cloud",
-    "write_text",
-]
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cylx.io.annotated import cylinder_colors as cylinder_colors
+    from cylx.io.annotated import write_annotated as write_annotated
+    from cylx.io.clouds import read_cloud as read_cloud
+    from cylx.io.clouds import write_cloud as write_cloud
+    from cylx.io.inputs import read_json as read_json
+    from cylx.io.outputs import check_writable as check_writable
+    from cylx.io.outputs import write_bytes as write_bytes
+    from cylx.io.outputs import write_text as write_text
+
+_HOMES = {
+    "check_writable": "cylx.io.outputs",
+    "cylinder_colors": "cylx.io.annotated",
+    "read_cloud": "cylx.io.clouds",
+    "read_json": "cylx.io.inputs",
+    "write_annotated": "cylx.io.annotated",
+    "write_bytes": "cylx.io.outputs",
+    "write_cloud": "cylx.io.clouds",
+    "write_text": "cylx.io.outputs",
+}
+
+__all__ = sorted(_HOMES)  # noqa: PLE0605  (the names are those above)
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'cylx.io' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

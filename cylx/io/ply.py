@@ -104,8 +104,9 @@ def _read_with_plyfile(header: Header, source: Input) -> NDArray[np.void]:
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")  # of an empty list
+            warnings.simplefilter("error", DeprecationWarning)  # numpy 1 reads 300 as the uchar 44
             return np.asarray(PlyData.read(stream)["vertex"].data)
-    except (PlyParseError, ValueError, OverflowError) as error:
+    except (PlyParseError, ValueError, OverflowError, DeprecationWarning) as error:
         raise InputError(source.place, f"broken PLY: {error}", "get a complete copy of the file") from None
 
 

@@ -75,7 +75,8 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
     try:
         with text_lines(source, rows.offset) as lines:
             table = _load(lines, rows, rows.delimiter, most)
-    except ValueError:  # what is wrong, and in which line, takes a slower look; if nothing is, the rows come with it
+    except (ValueError, DeprecationWarning):
+        # What is wrong, and in which line, takes a slower look; if nothing is, the rows come with it.
         with text_lines(source, rows.offset) as lines:
             table = _load(_checked(lines, rows, source.place), rows, None, most)
     if rows.count is not None and len(table) < rows.count:
@@ -152,6 +153,7 @@ def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
 def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: int | None) -> NDArray[np.void]:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # of empty lines and of an empty file, which is dealt with here
+        warnings.simplefilter("error", DeprecationWarning)  # numpy 1 reads 300 as the uchar 44
         return np.loadtxt(
             lines,
             dtype=rows.dtype,
