@@ -127,13 +127,13 @@ def line_screws(
     point, direction = np.broadcast_to(point, points.shape), np.broadcast_to(direction, directions.shape)
     feet, others, angle, axis = common_perpendicular(point, direction, points, directions)
     gap = others - feet
-    shift = (gap * axis).sum(-1)
     length = np.linalg.norm(gap, axis=-1)
     # parallel lines have an arbitrary axis: the motion is the translation itself
-    aside = length > np.abs(shift) + 1e-12 * (1.0 + length)
+    aside = (angle == 0.0) & (length > 0.0)
     axis = np.where(aside[..., None], gap / np.where(aside, length, 1.0)[..., None], axis)
-    shift = np.where(aside, length, shift)
-    return screw(axis, feet, angle, shift), angle, length
+    # of lines that are nearly parallel the feet are uncertain, but not the distance along the common perpendicular
+    shift = np.where(aside, length, ((points - point) * axis).sum(-1))
+    return screw(axis, feet, angle, shift), angle, np.abs(shift)
 
 
 def pairwise_screw_distances(points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 
-PARALLEL = 1e-6
-"""Below this angle, in radians, rounding of the directions moves the feet more than taking the lines for parallel does."""
+PARALLEL = 1e-8
+"""Below this angle, in radians, rounding of the directions changes the motion more than taking the lines for parallel does."""
 
 
 def common_perpendicular(
@@ -43,10 +43,12 @@ def common_perpendicular(
     angle = np.arctan2(sine, cosine)
     parallel = angle < PARALLEL
     across = second_points - first_points
-    a, b = (across * first_directions).sum(-1, keepdims=True), (across * turned).sum(-1, keepdims=True)
     square = np.where(parallel, 1.0, sine * sine)
-    t1 = np.where(parallel, 0.0, (a - cosine * b) / square)
-    t2 = np.where(parallel, -b, (cosine * a - b) / square)
+    # as determinants: in differences of dot products nearly parallel lines lose all their digits
+    t1 = (np.cross(across, turned) * normal).sum(-1, keepdims=True) / square
+    t2 = (np.cross(across, first_directions) * normal).sum(-1, keepdims=True) / square
+    t1 = np.where(parallel, 0.0, t1)
+    t2 = np.where(parallel, -(across * turned).sum(-1, keepdims=True), t2)
     helper = np.zeros_like(first_directions)
     np.put_along_axis(helper, np.abs(first_directions).argmin(-1)[..., None], 1.0, axis=-1)
     arbitrary = np.cross(first_directions, helper)
