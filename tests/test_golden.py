@@ -21,8 +21,13 @@ SAMPLES = ["pipes.ply", "room.pcd", "paper.xyz", "site_mm.ply"]
 README = (SAMPLE_DATA / "README.md").read_text(encoding="utf-8")
 
 
-def beside(sample, suffix):
-    return (SAMPLE_DATA / sample).with_suffix(suffix)
+def truth_of(sample):
+    return (SAMPLE_DATA / sample).with_suffix(".truth.json")
+
+
+def golden_of(sample):
+    """The golden results lie apart from where `cylx extract` writes, which never overwrites."""
+    return (SAMPLE_DATA / "golden" / sample).with_suffix(".cylinders.json")
 
 
 def load(path):
@@ -38,23 +43,23 @@ def sample(request):
 def found(sample, request):
     text = Result.of(extract(SAMPLE_DATA / sample)).to_json()
     if request.config.getoption("--regen"):
-        beside(sample, ".cylinders.json").write_text(text, encoding="utf-8", newline="\n")
+        golden_of(sample).write_text(text, encoding="utf-8", newline="\n")
     return json.loads(text)
 
 
 def test_every_cylinder_is_found_and_nothing_else(sample, found):
-    truth = load(beside(sample, ".truth.json"))
+    truth = load(truth_of(sample))
     assert not any(true["ignore"] for true in truth["cylinders"])
     score = evaluate(truth, found)
     assert (score.f1, score.missed, score.false) == (1.0, (), ())
 
 
 def test_the_result_is_the_golden_one(sample, found):
-    assert compare(load(beside(sample, ".cylinders.json")), found).differences == ()
+    assert compare(load(golden_of(sample)), found).differences == ()
 
 
 def test_the_golden_result_is_of_this_very_file_and_by_the_schema(sample):
-    golden = load(beside(sample, ".cylinders.json"))
+    golden = load(golden_of(sample))
     Result.parse(golden, sample)
     assert golden["input"]["file"] == sample
     assert golden["input"]["sha256"] == hashlib.sha256((SAMPLE_DATA / sample).read_bytes()).hexdigest()
@@ -65,7 +70,7 @@ def test_the_readme_says_how_it_was_made(sample, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made = CliRunner().invoke(main, shlex.split(command))
     assert made.exit_code == 0, made.output
-    truth, again = load(beside(sample, ".truth.json")), load((tmp_path / sample).with_suffix(".truth.json"))
+    truth, again = load(truth_of(sample)), load((tmp_path / sample).with_suffix(".truth.json"))
     assert compare(truth, again).same
     assert {**again, "cylinders": []} == {**truth, "cylinders": []}
     # another machine may round the last bit of a sine the other way; the noise is 200 times larger
@@ -73,6 +78,10 @@ def test_the_readme_says_how_it_was_made(sample, tmp_path, monkeypatch):
 
 
 def test_the_samples_are_small_and_all_are_told_of():
-    clouds = [path for path in SAMPLE_DATA.iterdir() if path.suffix in {".ply", ".pcd", ".xyz"}]
-    assert sorted(path.name for path in clouds) == sorted(SAMPLES)
-    assert sum(path.stat().st_size for path in SAMPLE_DATA.iterdir()) <= 6e6
+    outputs = {
+        (SAMPLE_DATA / sample).with_suffix(end) for sample in SAMPLES for end in (".cylinders.json", ".annotated.ply")
+    }
+    ours = [path for path in SAMPLE_DATA.rglob("*") if path.is_file() and path not in outputs]
+    clouds = [path.name for path in ours if path.suffix in {".ply", ".pcd", ".xyz"}]
+    assert sorted(clouds) == sorted(SAMPLES)
+    assert sum(path.stat().st_size for path in ours) <= 6e6
