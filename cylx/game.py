@@ -175,6 +175,13 @@ class SparsePayoff:
         self.values = values
         self._place = np.full(len(pointers) - 1, -1, np.int64)
 
+    @classmethod
+    def of(cls, payoff: FloatArray) -> SparsePayoff:
+        """Keep the positive entries of a dense matrix of shape (M, M)."""
+        rows, columns = np.nonzero(payoff)
+        pointers = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(payoff))))).astype(np.int64)
+        return cls(pointers, columns.astype(np.int64), payoff[rows, columns])
+
     def row(self, i: int) -> tuple[IndexArray, FloatArray]:
         """Give the columns and payoffs of row i."""
         part = slice(self.pointers[i], self.pointers[i + 1])

@@ -165,7 +165,7 @@ def resolve(config: Config, scene: Scene) -> Config:
             "radius_max": config.scene.radius_max or 0.5 * scene.extent,
         },
         "slicing": {"thickness": thickness},
-        "ellipses": {"tolerance": config.ellipses.tolerance or 2.5 * scene.noise + 0.06 * thickness},
+        "ellipses": {"tolerance": config.ellipses.tolerance or 4.0 * scene.noise + 0.06 * thickness},
     }
     return config.model_copy(
         update={name: getattr(config, name).model_copy(update=values) for name, values in known.items()}

@@ -9,7 +9,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "cli", "config", "cylx", "errors", "evaluation", "game", "geometry", "io", "pipeline", "records", "results",
+    "api", "cli", "config", "cylx", "errors", "evaluation", "game", "geometry", "io", "payoff", "pipeline", "records",
+    "results",
     "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
@@ -18,7 +19,8 @@ MAY_IMPORT = {
     "cli": EVERYTHING,
     "api": {"config", "errors", "io", "pipeline", "records"},
     "pipeline": {"config", "errors", "game", "geometry", "records", "scene", "stages"},
-    "stages": {"config", "errors", "game", "geometry", "records"},
+    "stages": {"config", "errors", "game", "geometry", "payoff", "records"},
+    "payoff": {"game", "geometry"},
     "scene": {"config", "errors", "geometry", "records"},
     "results": {"config", "cylx", "errors", "geometry", "records"},
     "io": {"errors", "geometry", "records"},

@@ -44,6 +44,75 @@ class Kernel(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
+def _accumulate(
+    points: FloatArray,
+    n: int,
+    model: FloatArray,
+    low: float,
+    high: float,
+    width: float,
+    normal: FloatArray,
+    right: FloatArray,
+    frame: FloatArray,
+    row: FloatArray,
+    sums: FloatArray,
+) -> None:
+    """Fill the weighted normal equations of one Gauss-Newton step; `sums` gets weights, squares and the largest height."""
+    fill_frame(model[3:6], frame)
+    for a in range(5):
+        right[a] = 0.0
+        for b in range(5):
+            normal[a, b] = 0.0
+    weights, squares, reach = 0.0, 0.0, 0.0
+    for i in range(n):
+        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+        z = dx * model[3] + dy * model[4] + dz * model[5]
+        if z < low or z > high:
+            continue
+        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        distance = math.sqrt(x * x + y * y) + 1e-300
+        residual = distance - model[6]
+        ratio = residual / width
+        if abs(ratio) >= 1.0:
+            continue
+        weight = (1.0 - ratio * ratio) ** 2
+        row[0], row[1] = x / distance, y / distance
+        row[2], row[3], row[4] = z * row[0], z * row[1], 1.0
+        for a in range(5):
+            scaled = weight * row[a]
+            right[a] += scaled * residual
+            for b in range(a + 1):
+                normal[a, b] += scaled * row[b]
+        weights += weight
+        squares += weight * residual * residual
+        reach = max(reach, abs(z))
+    for a in range(5):
+        normal[a, a] *= 1.0 + 1e-9
+        for b in range(a + 1, 5):
+            normal[a, b] = normal[b, a]
+    sums[0], sums[1], sums[2] = weights, squares, reach
+
+
+@njit(cache=True, nogil=True)
+def _advance(model: FloatArray, right: FloatArray, frame: FloatArray, reach: float) -> float:
+    """Move the model by a step, at most half a radius long; give the undamped length of the step."""
+    size = max(max(abs(right[0]), abs(right[1])), abs(right[4]))
+    size = max(size, max(abs(right[2]), abs(right[3])) * reach)
+    damping = 1.0 if size < 0.5 * model[6] else 0.5 * model[6] / size
+    length = 0.0
+    for d in range(3):
+        model[d] += damping * (right[0] * frame[0, d] + right[1] * frame[1, d])
+        model[3 + d] += damping * (right[2] * frame[0, d] + right[3] * frame[1, d])
+        length += model[3 + d] ** 2
+    length = math.sqrt(length)
+    for d in range(3):
+        model[3 + d] /= length
+    model[6] += damping * right[4]
+    return size
+
+
+@njit(cache=True, nogil=True)
 def fit_in_place(
     points: FloatArray,
     n: int,
@@ -68,62 +137,14 @@ def fit_in_place(
     float
         Standard deviation of the weighted residuals at the last step; negative if the fit broke down.
     """
-    width = start
-    spread = start / 3.0
-    row = np.empty(5)
-    for step in range(steps):
-        fill_frame(model[3:6], frame)
-        for a in range(5):
-            right[a] = 0.0
-            for b in range(5):
-                normal[a, b] = 0.0
-        weights = 0.0
-        squares = 0.0
-        reach = 0.0
-        for i in range(n):
-            dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
-            z = dx * model[3] + dy * model[4] + dz * model[5]
-            if z < low or z > high:
-                continue
-            x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-            y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-            distance = math.sqrt(x * x + y * y) + 1e-300
-            residual = distance - model[6]
-            ratio = residual / width
-            if abs(ratio) >= 1.0:
-                continue
-            weight = (1.0 - ratio * ratio) ** 2
-            row[0], row[1] = x / distance, y / distance
-            row[2], row[3], row[4] = z * row[0], z * row[1], 1.0
-            for a in range(5):
-                scaled = weight * row[a]
-                right[a] += scaled * residual
-                for b in range(a + 1):
-                    normal[a, b] += scaled * row[b]
-            weights += weight
-            squares += weight * residual * residual
-            reach = max(reach, abs(z))
-        if weights < 8.0:
+    width, spread = start, start / 3.0
+    row, sums = np.empty(5), np.empty(3)
+    for _ in range(steps):
+        _accumulate(points, n, model, low, high, width, normal, right, frame, row, sums)
+        if sums[0] < 8.0 or not solve_in_place(normal, right, 5):
             return -1.0
-        for a in range(5):
-            normal[a, a] *= 1.0 + 1e-9
-            for b in range(a + 1, 5):
-                normal[a, b] = normal[b, a]
-        if not solve_in_place(normal, right, 5):
-            return -1.0
-        spread = math.sqrt(squares / weights)
-        size = max(max(abs(right[0]), abs(right[1])), abs(right[4]))
-        size = max(size, max(abs(right[2]), abs(right[3])) * reach)
-        damping = 1.0 if size < 0.5 * model[6] else 0.5 * model[6] / size
-        length = 0.0
-        for d in range(3):
-            model[d] += damping * (right[0] * frame[0, d] + right[1] * frame[1, d])
-            model[3 + d] += damping * (right[2] * frame[0, d] + right[3] * frame[1, d])
-            length += model[3 + d] ** 2
-        length = math.sqrt(length)
-        for d in range(3):
-            model[3 + d] /= length
-        model[6] += damping * right[4]
+        spread = math.sqrt(sums[1] / sums[0])
+        size = _advance(model, right, frame, sums[2])
         if not (0.0 < model[6] < 1e12):
             return -1.0
         # a fixed schedule needs no more than its floor; the estimate of a final fit is iterated to its fixed point
@@ -206,3 +227,13 @@ def candidate_quality(
         filled += 1 if bins[a] > 0 else 0
     quality[0], quality[1] = count, highest - lowest if count else 0.0
     quality[2], quality[3] = filled / len(bins), inside
+
+
+@njit(cache=True, nogil=True)
+def move_to_foot(model: FloatArray, center: FloatArray) -> None:
+    """Take a model given about `center` back to the frame of `center`, its point at the axis point nearest to it."""
+    foot = 0.0
+    for d in range(3):
+        foot -= model[d] * model[3 + d]
+    for d in range(3):
+        model[d] += foot * model[3 + d] + center[d]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 PARALLEL = 1e-8
-"""Below this angle, in radians, rounding of the directions changes the motion more than taking the lines for parallel does."""
+"""Below this angle, in radians, rounding of the directions costs more than taking the lines for parallel."""
 
 
 def common_perpendicular(

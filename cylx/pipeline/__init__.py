@@ -10,6 +10,7 @@ from cylx.pipeline.conclusion import conclude
 from cylx.pipeline.journal import Journal
 from cylx.pipeline.sources import candidates_of_slices, ellipses_of_slices, windows_and_flatness
 from cylx.pipeline.turns import Turns
+from cylx.pipeline.warmup import kernels_are_cold, practice_cloud
 from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
 from cylx.scene import check_usable, make_frame, radius_range, resolve
 from cylx.stages.clustering import CandidateGame, thin_candidates
@@ -44,6 +45,9 @@ def extract_cylinders(
     check_usable(cloud.points, cloud.source.file)
     threads = threads or os.cpu_count() or 1
     journal = Journal(observer or SilentObserver())
+    if kernels_are_cold():
+        with journal.stage("compiling"):
+            extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
     with journal.stage("scene"):
         frame, scene = make_frame(cloud.points, config)
         config = resolve(config, scene)

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
-from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place
+from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place, move_to_foot
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
 
@@ -149,10 +149,6 @@ def _polish(
         candidate_quality(around, n, model, 3.0 * noise, axes, bins, quality)
         if quality[0] < min_inliers or quality[0] < min_share * n or quality[1] < 0.5 * model[6]:
             continue
-        foot = 0.0
-        for d in range(3):
-            foot -= model[d] * model[3 + d]
-        for d in range(3):
-            model[d] += foot * model[3 + d] + center[d]
+        move_to_foot(model, center)
         rows[c, 7], rows[c, 8] = quality[0], quality[1]
         kept[c] = True

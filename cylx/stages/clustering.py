@@ -10,21 +10,16 @@ import heapq
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import ClusteringConfig
 from cylx.game import SparsePayoff, evolve
-from cylx.geometry.dual_quaternions import pairwise_screw_distances
+from cylx.payoff import local_payoff, screw_payoff
 from cylx.records import Candidates, Cluster, Segment, StageReport
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-CUT = 0.1
-"""Local payoffs below this are zero."""
-REACH = 4.0
-"""Candidates play against those within this many radii, or their own extent if that is more."""
 MEMBER = 0.35
 """Everybody whose payoff against the equilibrium exceeds this share of the mean belongs to the cluster."""
 CROWD = 400
@@ -51,9 +46,18 @@ class CandidateGame:
         self._dropped = {"too small": 0, "too little payoff": 0}
         self._clusters = 0
         if config.kernel == "screw":
-            self._payoff: SparsePayoff = _dense_to_sparse(screw_payoff(candidates, config))
+            dense = screw_payoff(candidates.models, candidates.parents, config.screw_scale, config.min_radius_ratio)
+            self._payoff = SparsePayoff.of(dense)
         else:
-            self._payoff = local_payoff(candidates, config)
+            self._payoff = local_payoff(
+                candidates.models,
+                candidates.parents,
+                candidates.extents,
+                math.radians(config.angle_deg),
+                config.offset,
+                config.radius,
+                config.min_radius_ratio,
+            )
         self._degrees = self._payoff.degrees()
         self._heap = [(-degree, i) for i, degree in enumerate(self._degrees.tolist())]
         heapq.heapify(self._heap)
@@ -178,116 +182,6 @@ def _agree(
         & (cosine > math.cos(math.radians(angle_deg))),
         dtype=np.bool_,
     )
-
-
-def screw_payoff(candidates: Candidates, config: ClusteringConfig) -> FloatArray:
-    """Give the paper's payoff (eq. 2, 5 and 6) of all pairs, shape (M, M).
-
-    Lengths are measured in the median radius of the candidates and from the middle of their points: eq. 1 mixes radians with
-    lengths and depends on the origin, and so the paper's own experiments, a cylinder of radius 1 at the origin, are met exactly.
-    """
-    if len(candidates) == 0:
-        return np.zeros((0, 0))
-    scale = float(np.median(candidates.radii))
-    middle = np.median(candidates.points, axis=0)
-    points = (candidates.points - middle) / scale
-    radii = candidates.radii / scale
-    distance, gap = pairwise_screw_distances(points, candidates.directions)
-    ratio = np.minimum.outer(radii, radii) / np.maximum.outer(radii, radii)
-    compatible = (gap < np.add.outer(radii, radii)) & (ratio > config.min_radius_ratio)
-    compatible &= candidates.parents[:, None] != candidates.parents[None, :]
-    return np.where(compatible, np.exp(-distance / config.screw_scale), 0.0)
-
-
-def local_payoff(candidates: Candidates, config: ClusteringConfig) -> SparsePayoff:
-    """Give the payoffs of all pairs within reach: angle, offset at the candidates in radii, ratio of radii.
-
-    Parameters
-    ----------
-    candidates : Candidates
-    config : ClusteringConfig
-
-    Returns
-    -------
-    SparsePayoff
-        exp(-sqrt((angle / a)^2 + (offset / o)^2 + ((1 - ratio) / p)^2)) where it exceeds 0.1, else nothing.
-    """
-    order = np.argsort(candidates.radii, kind="stable")
-    models = np.ascontiguousarray(candidates.models[order])
-    parents, extents = candidates.parents[order], candidates.extents[order]
-    least_ratio = max(config.min_radius_ratio, 1.0 + math.log(CUT) * config.radius)
-    widths = math.radians(config.angle_deg), config.offset, config.radius
-    counts = np.zeros(len(models) + 1, np.int64)
-    nothing = np.empty(0, np.int64), np.empty(0)
-    _pairs(models, parents, extents, least_ratio, *widths, counts[1:], np.empty(0, np.int64), *nothing, False)
-    pointers = np.cumsum(counts)
-    columns, values = np.empty(pointers[-1], np.int64), np.empty(pointers[-1])
-    _pairs(models, parents, extents, least_ratio, *widths, counts[1:], pointers[:-1].copy(), columns, values, True)
-    # back from the order of radii to the order of the candidates
-    rows = order[np.repeat(np.arange(len(models)), counts[1:])]
-    columns = order[columns]
-    sort = np.lexsort((columns, rows))
-    starts = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(models))))).astype(np.int64)
-    return SparsePayoff(starts, columns[sort], values[sort])
-
-
-@njit(cache=True, nogil=True)
-def _pairs(
-    models: FloatArray,
-    parents: IndexArray,
-    extents: FloatArray,
-    least_ratio: float,
-    angle: float,
-    offset: float,
-    radius: float,
-    counts: IndexArray,
-    ends: IndexArray,
-    columns: IndexArray,
-    values: FloatArray,
-    fill: bool,
-) -> None:
-    """Count the pairs of each row, or fill them in at `ends`; the models come by ascending radius."""
-    bound = -math.log(CUT)
-    sine = math.sin(min(1.5, bound * angle))
-    for i in range(len(models)):
-        for j in range(i + 1, len(models)):
-            ratio = models[i, 6] / models[j, 6]
-            if ratio < least_ratio:
-                break
-            mean = 0.5 * (models[i, 6] + models[j, 6])
-            reach = max(REACH * mean, max(extents[i], extents[j]))
-            dx, dy, dz = models[j, 0] - models[i, 0], models[j, 1] - models[i, 1], models[j, 2] - models[i, 2]
-            square = dx * dx + dy * dy + dz * dz
-            if square > reach * reach or parents[i] == parents[j]:
-                continue
-            cx = models[i, 4] * models[j, 5] - models[i, 5] * models[j, 4]
-            cy = models[i, 5] * models[j, 3] - models[i, 3] * models[j, 5]
-            cz = models[i, 3] * models[j, 4] - models[i, 4] * models[j, 3]
-            turn = math.sqrt(cx * cx + cy * cy + cz * cz)
-            if turn > sine:
-                continue
-            a = dx * models[i, 3] + dy * models[i, 4] + dz * models[i, 5]
-            b = dx * models[j, 3] + dy * models[j, 4] + dz * models[j, 5]
-            shift = 0.5 * (math.sqrt(max(0.0, square - a * a)) + math.sqrt(max(0.0, square - b * b))) / mean
-            strangeness = (math.asin(min(1.0, turn)) / angle) ** 2 + (shift / offset) ** 2
-            strangeness += ((1.0 - ratio) / radius) ** 2
-            if strangeness > bound * bound:
-                continue
-            if fill:
-                value = math.exp(-math.sqrt(strangeness))
-                columns[ends[i]], values[ends[i]] = j, value
-                columns[ends[j]], values[ends[j]] = i, value
-                ends[i] += 1
-                ends[j] += 1
-            else:
-                counts[i] += 1
-                counts[j] += 1
-
-
-def _dense_to_sparse(payoff: FloatArray) -> SparsePayoff:
-    rows, columns = np.nonzero(payoff)
-    pointers = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(payoff))))).astype(np.int64)
-    return SparsePayoff(pointers, columns.astype(np.int64), payoff[rows, columns])
 
 
 def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:

@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
-from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place
+from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place, move_to_foot
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
 from cylx.records import Candidates, Frame, StageReport
@@ -162,61 +162,70 @@ def _scan(
 ) -> None:
     found = np.empty(CAPACITY, np.int64)
     around, inner = np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
-    center, normal, heights = np.empty(3), np.empty(3), np.empty(CAPACITY)
+    plane, heights = np.empty((2, 3)), np.empty(CAPACITY)
     matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
     right, axes = np.empty(6), np.empty((2, 3))
     quality, bins = np.empty(4), np.empty(36, np.int64)
     for s in range(len(seeds)):
-        seed = points[seeds[s]]
+        seed, model = points[seeds[s]], rows[s, :7]
         n = gather_ball(points, cells, starts, side, seed, 2.0 * radius, found)
-        m = 0
-        for a in range(n):
-            square = 0.0
-            for d in range(3):
-                around[a, d] = points[found[a], d] - seed[d]
-                square += around[a, d] ** 2
-            if square < radius * radius:
-                for d in range(3):
-                    inner[m, d] = around[a, d]
-                m += 1
+        m = _center_window(points, found, n, seed, radius, around, inner)
         if m < 12 or n < 20:
             outcome[s] = 0
             continue
-        if fit_plane(around, n, noise, center, normal, matrix, vectors) > FLAT_SHARE:
+        if fit_plane(around, n, noise, plane[0], plane[1], matrix, vectors) > FLAT_SHARE:
             outcome[s] = 1
             for d in range(3):
-                planes[s, d] = center[d] + seed[d]
-                planes[s, 3 + d] = normal[d]
+                planes[s, d] = plane[0, d] + seed[d]
+                planes[s, 3 + d] = plane[1, d]
             continue
-        fit_plane(inner, m, noise, center, normal, matrix, vectors)
-        model = rows[s, :7]
         outcome[s] = 2
-        if not osculating_cylinder(inner, m, noise, center, normal, model, matrix, right, axes, heights):
+        fit_plane(inner, m, noise, plane[0], plane[1], matrix, vectors)
+        if not osculating_cylinder(inner, m, noise, plane[0], plane[1], model, matrix, right, axes, heights):
             continue
         if not (max(0.35 * radius, 4.0 * noise) <= model[6] <= 14.0 * radius):
             continue
-        floor = max(3.0 * noise, 0.01 * model[6])
-        spread = fit_in_place(
-            around, n, model, -math.inf, math.inf, max(0.3 * model[6], 4.0 * noise), floor, 0.6, math.inf, 10, matrix, right, axes
-        )  # fmt: skip
-        # a Gaussian within the kernel has 0.27 of its width, a uniform background 0.378
         outcome[s] = 3
-        r = model[6]
+        start, floor = max(0.3 * model[6], 4.0 * noise), max(3.0 * noise, 0.01 * model[6])
+        spread = fit_in_place(
+            around, n, model, -math.inf, math.inf, start, floor, 0.6, math.inf, 10, matrix, right, axes
+        )
+        # a Gaussian within the kernel has 0.27 of its width, a uniform background 0.378
         if spread < 0.0 or spread > 0.34 * floor:
             continue
-        if not (max(0.3 * radius, 4.0 * noise, least) <= r <= min(16.0 * radius, greatest)):
+        if not (max(0.3 * radius, 4.0 * noise, least) <= model[6] <= min(16.0 * radius, greatest)):
             continue
-        candidate_quality(around, n, model, 3.0 * noise, axes, bins, quality)
         outcome[s] = 4
+        candidate_quality(around, n, model, 3.0 * noise, axes, bins, quality)
         if quality[0] < min_inliers or quality[0] < min_share * n or quality[1] < 0.8 * radius:
             continue
         outcome[s] = 5
-        foot = 0.0
-        for d in range(3):
-            foot -= model[d] * model[3 + d]
-        for d in range(3):
-            model[d] += foot * model[3 + d] + seed[d]
+        move_to_foot(model, seed)
         rows[s, 7], rows[s, 8], rows[s, 9] = quality[0], quality[1], spread
+
+
+@njit(cache=True, nogil=True)
+def _center_window(
+    points: FloatArray,
+    found: IndexArray,
+    n: int,
+    seed: FloatArray,
+    radius: float,
+    around: FloatArray,
+    inner: FloatArray,
+) -> int:
+    """Copy a window's points, its seed at zero, to `around`, and those within `radius` to `inner`; give the number of these."""
+    m = 0
+    for a in range(n):
+        square = 0.0
+        for d in range(3):
+            around[a, d] = points[found[a], d] - seed[d]
+            square += around[a, d] ** 2
+        if square < radius * radius:
+            for d in range(3):
+                inner[m, d] = around[a, d]
+            m += 1
+    return m
 
 
 def _mark_flat(frame: Frame, seeds: FloatArray, planes: FloatArray, radius: float, flatness: FloatArray) -> None:
