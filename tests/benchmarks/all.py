@@ -1,0 +1,99 @@
+"""Run every benchmark and write its command and its tables into docs/benchmarks.md, between the markers there.
+
+FOLDER has the scenes that `scenes_make.py FOLDER` makes. A table whose data are missing is left as it is.
+Exits with 1 if a bar was missed, with 2 if something could not be run.
+"""
+
+import argparse
+import platform
+import re
+import shlex
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+from runs import ROOT
+
+PAGE = ROOT / "docs" / "benchmarks.md"
+HERE = Path(__file__).parent
+SCENES = "scenes"  # what the folder is called on the page
+
+BENCHMARKS = {
+    "single-paper": "single.py --preset paper --max-angle 0.4 --max-offset 0.01 --max-radius 0.5",
+    "single-auto": "single.py --preset auto --max-angle 0.05 --max-offset 0.002 --max-radius 0.1",
+    "single-arc": "single.py --preset auto --theta 135 --sigma 0.005 --sigma-o 0.01 --p 0.1 --max-angle 0.05",
+    "cans": "scenes.py scenes/five?.ply scenes/pair?.ply --min-f1 1",
+    "pair": "pair.py scenes/pair?.ply --max-angle 0.1",
+    "mug": "mug.py --max-angle 1.5 --max-radius 1",
+    "clutter": "scenes.py scenes/table?.ply scenes/view?.ply scenes/clutter?.ply",
+    "rack": "scenes.py scenes/rack?.ply",
+    "startup": "startup.py",
+}
+
+
+def arguments(command, folder):
+    """Split a command of the page and put in the scenes there are; an empty list if there are none."""
+    words = []
+    for word in shlex.split(command):
+        if word.startswith(f"{SCENES}/"):
+            found = sorted(folder.glob(word.removeprefix(f"{SCENES}/")))
+            if not found:
+                return []
+            words += map(str, found)
+        else:
+            words.append(word)
+    return [str(HERE / words[0]), *words[1:]]
+
+
+def between_markers(page, name, text):
+    """Put text between the markers of a name."""
+    begin, end = f"<!-- begin {name} -->\n", f"<!-- end {name} -->"
+    pattern = re.compile(f"{re.escape(begin)}.*?{re.escape(end)}", re.DOTALL)
+    if len(pattern.findall(page)) != 1:
+        sys.exit(f"{PAGE}: must have one pair of markers '{begin.strip()}' and '{end}'")
+    return pattern.sub(lambda _: f"{begin}{text}\n{end}", page)
+
+
+def write(name, text):
+    """Write a part of the page at once, so that a long run that is stopped has not been for nothing."""
+    PAGE.write_text(between_markers(PAGE.read_text(encoding="utf-8"), name, text), encoding="utf-8")
+
+
+def versions():
+    """Say what was measured."""
+    parts = [f"cylx {version('cylx')}", f"Python {platform.python_version()}"]
+    return ", ".join([*parts, *(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy"))])
+
+
+def run(name, folder):
+    """Run one benchmark and write its part; return its exit code."""
+    command = arguments(BENCHMARKS[name], folder)
+    if not command:
+        print(f"{name}: no such scenes in {folder}; scenes_make.py makes them", flush=True)
+        return 2
+    done = subprocess.run([sys.executable, *command], stdout=subprocess.PIPE, text=True, check=False)
+    print(f"{name}: exit {done.returncode}\n{done.stdout}", flush=True)
+    if done.returncode in (0, 1) and done.stdout:
+        write(name, f"\n```console\npython tests/benchmarks/{BENCHMARKS[name]}\n```\n\n{done.stdout.strip()}\n")
+        return done.returncode
+    return 2
+
+
+def main():
+    """Run all of them, one after the other."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folder", type=Path, help="folder of the scenes")
+    parser.add_argument(
+        "--only", nargs="+", choices=BENCHMARKS, metavar="NAME", help=f"some of: {' '.join(BENCHMARKS)}"
+    )
+    a = parser.parse_args()
+    codes = {name: run(name, a.folder) for name in a.only or BENCHMARKS}
+    if not a.only:
+        write("versions", f"\nMeasured with {versions()}.\n")
+    print(*(f"{name}: {('all bars met', 'BAR MISSED', 'NOT RUN')[code]}" for name, code in codes.items()), sep="\n")
+    return max(codes.values())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
