@@ -86,7 +86,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
     middle = points.mean(axis=0)
     offsets = points - middle
     scale = float(np.sqrt((offsets**2).sum(axis=1).mean()))
-    if not scale > 0:
+    if not (np.ptp(points, axis=0).any() and scale > 0):  # the mean of equal points is off by rounding
         return Degenerate("all points are equal")
     x, y = (offsets / scale).T
     quadratic = np.column_stack([x * x, x * y, y * y])

@@ -39,6 +39,8 @@ def common_perpendicular(
     turned = sign * second_directions
     cosine = (first_directions * turned).sum(-1, keepdims=True)
     normal = np.cross(first_directions, turned)
+    # rounding along the lines is much of the cross product of nearly parallel ones
+    normal -= (normal * first_directions).sum(-1, keepdims=True) * first_directions
     sine = np.linalg.norm(normal, axis=-1, keepdims=True)
     angle = np.arctan2(sine, cosine)
     parallel = angle < PARALLEL
