@@ -1,0 +1,111 @@
+"""The linear algebra of the kernels, against that of NumPy."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cylx.geometry.small_matrices import fill_frame, solve_in_place, symmetric_eigen
+
+seeds = st.integers(0, 2**32 - 1)
+laws = settings(max_examples=50, deadline=None)
+
+
+@laws
+@given(seeds, st.integers(1, 6), st.floats(-8, 8))
+def test_it_solves_as_numpy_does(seed, n, exponent):
+    rng = np.random.default_rng(seed)
+    matrix, right = 10.0**exponent * rng.standard_normal((n, n)), rng.standard_normal(n)
+    condition = np.linalg.cond(matrix)
+    expected = np.linalg.solve(matrix, right)
+    assert solve_in_place(matrix.copy(), solution := right.copy(), n)
+    assert np.allclose(solution, expected, rtol=0, atol=1e-14 * condition * np.abs(expected).max())
+
+
+@laws
+@given(seeds)
+def test_rows_may_stand_in_any_order(seed):
+    rng = np.random.default_rng(seed)
+    matrix, right, order = rng.standard_normal((5, 5)), rng.standard_normal(5), rng.permutation(5)
+    condition = np.linalg.cond(matrix)
+    solve_in_place(matrix.copy(), one := right.copy(), 5)
+    solve_in_place(matrix[order], other := right[order], 5)
+    assert np.allclose(one, other, rtol=0, atol=1e-14 * condition * np.abs(one).max())
+
+
+def test_a_part_of_the_scratch_is_a_system_of_its_own():
+    rng = np.random.default_rng(1)
+    matrix, right = rng.standard_normal((6, 6)), rng.standard_normal(6)
+    expected = np.linalg.solve(matrix[:4, :4], right[:4])
+    rest = right[4:].copy()
+    assert solve_in_place(matrix, right, 4)
+    assert np.allclose(right[:4], expected)
+    assert np.array_equal(right[4:], rest)
+
+
+@pytest.mark.parametrize(
+    "matrix",
+    [
+        np.zeros((3, 3)),
+        np.ones((3, 3)),
+        np.array([[1.0, 2, 3], [2, 4, 6], [1, 0, 1]]),
+        np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1e-17]]),
+    ],
+)
+@pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
+def test_a_singular_matrix_is_told(matrix, scale):
+    assert not solve_in_place(scale * matrix, np.ones(3), 3)
+
+
+def test_a_zero_on_the_diagonal_is_no_singularity():
+    matrix, right = np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 2]]), np.array([1.0, 2, 4])
+    assert solve_in_place(matrix, right, 3)
+    assert right.tolist() == [2, 1, 2]
+
+
+def symmetric(seed, spread):
+    """Give a symmetric matrix with eigenvalues over a few orders of magnitude."""
+    rng = np.random.default_rng(seed)
+    basis = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    return (basis * (10.0 ** rng.uniform(-spread, spread, 3) * rng.choice([-1, 1], 3))) @ basis.T
+
+
+@laws
+@given(seeds, st.floats(0, 5))
+def test_it_diagonalises_as_numpy_does(seed, spread):
+    matrix = symmetric(seed, spread)
+    matrix = 0.5 * (matrix + matrix.T)
+    values, vectors = matrix.copy(), np.empty((3, 3))
+    symmetric_eigen(values, vectors)
+    largest = np.abs(matrix).max()
+    assert np.allclose(np.sort(np.diag(values)), np.linalg.eigvalsh(matrix), rtol=0, atol=1e-14 * largest)
+    assert np.allclose(vectors.T @ vectors, np.eye(3), rtol=0, atol=1e-14)
+    assert np.allclose(matrix @ vectors, vectors * np.diag(values), rtol=0, atol=1e-14 * largest)
+
+
+@pytest.mark.parametrize("matrix", [np.zeros((3, 3)), np.eye(3), np.diag([3.0, 1, 1]), np.ones((3, 3))])
+def test_equal_eigenvalues_are_no_trouble(matrix):
+    values, vectors = matrix.copy(), np.empty((3, 3))
+    symmetric_eigen(values, vectors)
+    assert np.allclose(np.sort(np.diag(values)), np.linalg.eigvalsh(matrix), atol=1e-15)
+    assert np.allclose((vectors * np.diag(values)) @ vectors.T, matrix, atol=1e-15)
+
+
+DIRECTIONS = [
+    *np.eye(3),
+    *-np.eye(3),
+    np.ones(3),
+    np.array([1, 1, 0.0]),
+    np.array([0, -1, 1.0]),
+    np.array([1e-9, 1, 0]),
+]
+
+
+@pytest.mark.parametrize("direction", [*DIRECTIONS, *np.random.default_rng(5).standard_normal((10, 3))])
+def test_a_frame_is_right_handed_and_unit(direction):
+    direction = direction / np.linalg.norm(direction)
+    frame = np.empty((2, 3))
+    fill_frame(direction, frame)
+    whole = np.vstack([frame, direction])
+    assert np.allclose(whole @ whole.T, np.eye(3), rtol=0, atol=1e-14)
+    assert np.linalg.det(whole) > 0
