@@ -20,7 +20,7 @@ FloatArray = NDArray[np.float64]
 
 TUKEY = 4.685
 """Tuning constant of the biweight at 95 % efficiency, in standard deviations."""
-TUKEY_SPREAD = 1.15
+TUKEY_SPREAD = 1.0989
 """Standard deviation of Gaussian residuals over that of the same residuals weighted by the biweight at 4.685."""
 
 
