@@ -56,7 +56,7 @@ def show(*, settings: Config, as_json: bool) -> None:
 @click.argument("file")
 @debug_option
 def check(*, file: str) -> None:
-    """Say whether a configuration is valid, and what is wrong with it if not."""
+    """Say whether the configuration FILE is valid, and what is wrong with it if not."""
     from cylx.config import load_config
 
     answer(f"{file}: valid, preset {load_config(path=file).preset}\n")
