@@ -1,0 +1,222 @@
+"""The game: payoffs only rise, both dynamics end in dominant sets, the diagonal decides whether there are clusters."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cylx.game import SparsePayoff, evolve
+
+seeds = st.integers(0, 2**32 - 1)
+laws = settings(max_examples=40, deadline=None)
+both = pytest.mark.parametrize("dynamics", ["replicator", "infection-immunization"])
+PATIENT = {"replicator": (300000, 1e-13), "infection-immunization": (20000, 1e-9)}
+
+
+def settle(payoff, dynamics, start=None):
+    """Run one of the dynamics to its end."""
+    steps, tolerance = PATIENT[dynamics]
+    return evolve(payoff, dynamics=dynamics, max_iterations=steps, tolerance=tolerance, start=start)
+
+
+def random_payoff(seed, n, *, density=1.0, diagonal=0.0):
+    """Give a symmetric matrix with entries in [0, 1] and the same number all along the diagonal."""
+    rng = np.random.default_rng(seed)
+    payoff = np.triu(rng.random((n, n)) * (rng.random((n, n)) < density), 1)
+    return payoff + payoff.T + diagonal * np.eye(n)
+
+
+def camps(seed, sizes, *, within=(0.6, 1.0), between=(0.0, 0.2), diagonal=0.0):
+    """Give the payoffs of groups that agree among themselves and hardly with others."""
+    rng = np.random.default_rng(seed)
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    same = owner[:, None] == owner
+    payoff = np.where(same, rng.uniform(*within, same.shape), rng.uniform(*between, same.shape))
+    payoff = np.triu(payoff, 1)
+    return payoff + payoff.T + diagonal * np.eye(len(owner)), owner
+
+
+def regret(payoff, population):
+    """Give how much anybody could gain, and how much of the population does worse than the mean."""
+    fitness = payoff @ population
+    mean = population @ fitness
+    return (fitness - mean).max(), ((mean - fitness) * population).max()
+
+
+@laws
+@given(seeds, st.integers(2, 15), st.floats(0.2, 1.0), st.sampled_from([0.0, 0.5, 1.0]))
+def test_replicators_never_lose_payoff(seed, n, density, diagonal):
+    payoff = random_payoff(seed, n, density=density, diagonal=diagonal)
+    population = np.random.default_rng(seed + 1).dirichlet(np.ones(n))
+    last = population @ payoff @ population
+    for _ in range(60):
+        after = evolve(payoff, dynamics="replicator", max_iterations=1, tolerance=1e-15, start=population)
+        now = after @ payoff @ after
+        assert now >= last * (1 - 1e-12)
+        assert (after[population == 0] == 0).all()  # nobody comes back
+        population, last = after, now
+
+
+@laws
+@given(seeds, st.integers(2, 10))
+def test_a_step_of_the_replicators_is_equation_seven(seed, n):
+    payoff = random_payoff(seed, n, diagonal=0.3)
+    start = np.random.default_rng(seed).dirichlet(np.ones(n))
+    expected = start * (payoff @ start) / (start @ payoff @ start)
+    found = evolve(payoff, dynamics="replicator", max_iterations=1, tolerance=1e-15, start=start)
+    assert np.allclose(found, expected, rtol=0, atol=1e-8)  # what is nearly nothing becomes nothing
+
+
+@both
+@laws
+@given(seeds, st.integers(1, 15), st.floats(0, 1), st.integers(0, 30))
+def test_a_population_is_one_at_every_step(dynamics, seed, n, density, steps):
+    payoff = random_payoff(seed, n, density=density)
+    population = evolve(payoff, dynamics=dynamics, max_iterations=max(steps, 1), tolerance=1e-12)
+    assert (population >= 0).all()
+    assert np.isclose(population.sum(), 1.0, rtol=1e-12)
+    assert population @ payoff @ population >= payoff.mean() - 1e-12  # the uniform one, where it began
+
+
+@both
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds, n=st.integers(2, 12), density=st.floats(0.4, 1.0))
+def test_the_end_is_a_state_nobody_gains_from_leaving(dynamics, seed, n, density):
+    payoff = random_payoff(seed, n, density=density)
+    population = settle(payoff, dynamics)
+    gain, loss = regret(payoff, population)
+    # where two strategies are nearly as good as each other, replicators need for ever
+    assert gain < 1e-4
+    assert loss < 1e-4
+
+
+@both
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds, n=st.integers(2, 12))
+def test_members_of_the_end_exclude_nobody_among_them(dynamics, seed, n):
+    # of two strategies of a stable state a_ii + a_jj < 2 a_ij, so with a zero diagonal a_ij > 0
+    payoff = random_payoff(seed, n, density=0.6)
+    if not payoff.any():
+        return
+    members = np.flatnonzero(settle(payoff, dynamics) > 1e-3)
+    inside = payoff[np.ix_(members, members)]
+    assert len(members) >= 2
+    if dynamics == "infection-immunization":
+        assert (inside[~np.eye(len(members), dtype=bool)] > 0).all()
+
+
+@settings(max_examples=25, deadline=None)
+@given(seeds, st.lists(st.integers(4, 12), min_size=1, max_size=4, unique=True))
+def test_both_dynamics_end_in_the_same_state(seed, sizes):
+    payoff, _ = camps(seed, sizes)
+    slow, quick = (settle(payoff, dynamics) for dynamics in PATIENT)
+    assert np.allclose(slow, quick, rtol=0, atol=2e-3)
+    assert np.isclose(slow @ payoff @ slow, quick @ payoff @ quick, rtol=1e-6)
+
+
+@both
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds)
+def test_with_a_zero_diagonal_the_largest_camp_wins(dynamics, seed):
+    payoff, owner = camps(seed, [12, 5, 6], within=(0.8, 1.0))
+    members = settle(payoff, dynamics) > 1e-6
+    assert (owner[members] == 0).all()
+    assert members.sum() >= 6
+
+
+@both
+@settings(max_examples=15, deadline=None)
+@given(seed=seeds, start=st.booleans())
+def test_with_a_unit_diagonal_one_strategy_is_left(dynamics, seed, start):
+    payoff, owner = camps(seed, [10, 5], diagonal=1.0, within=(0.6, 0.95))
+    first = np.random.default_rng(seed).dirichlet(np.ones(15)) if start else None
+    population = settle(payoff, dynamics, first)
+    assert np.sort(population)[-1] > 1 - 1e-6
+    if not start:
+        assert owner[population.argmax()] == 0
+
+
+def crowd(diagonal, scale):
+    """Give the payoffs of 40 candidates close together and 60 scattered ones, at a sharpness of the kernel."""
+    rng = np.random.default_rng(8)
+    places = np.vstack([0.05 * rng.standard_normal((40, 5)), rng.uniform(-1, 1, (60, 5)) * [3, 3, 1.5, 1.5, 1.5]])
+    payoff = np.exp(-np.linalg.norm(places[:, None] - places, axis=2) / scale)
+    np.fill_diagonal(payoff, diagonal)
+    return payoff
+
+
+@pytest.mark.parametrize("scale", [5.0, 0.5, 0.05])
+def test_the_diagonal_decides_between_one_candidate_and_a_cluster(scale):
+    cluster = settle(crowd(0.0, scale), "infection-immunization")
+    assert cluster[:40].sum() > 0.999
+    assert (cluster > 1e-3).sum() >= 3
+    alone = settle(crowd(1.0, scale), "infection-immunization")
+    assert (alone > 1e-3).sum() == 1
+    assert alone[:40].sum() > 0.999
+
+
+def test_with_a_unit_diagonal_the_answer_depends_on_when_one_stops():
+    def sizes(diagonal):
+        steps = (30, 300, 3000, 30000)
+        payoff = crowd(diagonal, 5.0)
+        ends = [evolve(payoff, dynamics="replicator", max_iterations=n, tolerance=1e-15) for n in steps]
+        return [int((end > 1e-3).sum()) for end in ends]
+
+    clusters, single = sizes(0.0), sizes(1.0)
+    assert clusters[1] == clusters[2] == clusters[3] == 40
+    assert 40 == single[0] > single[1] > single[2] >= single[3] == 1
+
+
+@both
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds, factor=st.floats(-3, 3).map(lambda exponent: 10.0**exponent))
+def test_the_end_does_not_know_names_or_the_unit_of_payoff(dynamics, seed, factor):
+    payoff, _ = camps(seed, [8, 5])
+    order = np.random.default_rng(seed).permutation(13)
+    one, other = settle(payoff, dynamics), settle(factor * payoff[np.ix_(order, order)], dynamics)
+    assert np.allclose(other, one[order], rtol=0, atol=1e-3)
+
+
+@both
+def test_games_with_nothing_to_win_stay_as_they_are(dynamics):
+    assert evolve(np.empty((0, 0)), dynamics=dynamics).shape == (0,)
+    assert evolve(np.zeros((1, 1)), dynamics=dynamics).tolist() == [1.0]
+    assert evolve(np.zeros((4, 4)), dynamics=dynamics).tolist() == [0.25] * 4
+
+
+@both
+def test_a_state_at_rest_stays_there(dynamics):
+    payoff, _ = camps(1, [6, 3])
+    rest = settle(payoff, dynamics)
+    assert np.allclose(evolve(payoff, dynamics=dynamics, start=rest), rest, rtol=0, atol=1e-6)
+
+
+@both
+def test_the_payoff_and_the_start_are_left_as_they_were(dynamics):
+    payoff, start = random_payoff(2, 6), np.full(6, 1 / 6)
+    copies = payoff.copy(), start.copy()
+    evolve(payoff, dynamics=dynamics, start=start)
+    assert np.array_equal(payoff, copies[0])
+    assert np.array_equal(start, copies[1])
+
+
+def sparse(dense):
+    rows, columns = np.nonzero(dense)
+    pointers = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(dense)))))
+    return SparsePayoff(pointers.astype(np.int64), columns.astype(np.int64), dense[rows, columns])
+
+
+@laws
+@given(seeds, st.integers(1, 30), st.floats(0, 1))
+def test_a_sparse_payoff_is_the_dense_one(seed, n, density):
+    dense = random_payoff(seed, n, density=density)
+    payoff = sparse(dense)
+    rng = np.random.default_rng(seed)
+    assert np.allclose(payoff.degrees(), dense.sum(axis=1), rtol=1e-14)
+    for _ in range(3):  # the scratch of one block is clean for the next
+        nodes = rng.permutation(n)[: rng.integers(0, n + 1)].astype(np.int64)
+        assert np.array_equal(payoff.block(nodes), dense[np.ix_(nodes, nodes)])
+    for i in range(n):
+        columns, values = payoff.row(i)
+        assert np.array_equal(columns, np.flatnonzero(dense[i]))
+        assert np.array_equal(values, dense[i, columns])
