@@ -9,7 +9,7 @@ import click
 
 from cylx.cli.failures import answer
 from cylx.cli.group import ExampleGroup
-from cylx.cli.options import PRESETS, configured, debug_option, json_option, overwrite_option
+from cylx.cli.options import PRESETS, complete_files, configured, debug_option, json_option, overwrite_option
 
 if TYPE_CHECKING:
     from cylx.config import Config
@@ -21,7 +21,7 @@ def config() -> None:
 
 
 @config.command(examples=["cylx config init my.yaml", "cylx config init - --preset paper"])
-@click.argument("file", default="cylx.yaml")
+@click.argument("file", default="cylx.yaml", shell_complete=complete_files)
 @click.option("--preset", type=click.Choice(PRESETS), default="auto", show_default=True, help="Values to write.")
 @overwrite_option
 @debug_option
@@ -53,7 +53,7 @@ def show(*, settings: Config, as_json: bool) -> None:
 
 
 @config.command(examples=["cylx config check my.yaml", "cylx config check my.yaml && cylx extract scan.ply -c my.yaml"])
-@click.argument("file")
+@click.argument("file", shell_complete=complete_files)
 @debug_option
 def check(*, file: str) -> None:
     """Say whether the configuration FILE is valid, and what is wrong with it if not."""

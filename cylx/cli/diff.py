@@ -10,7 +10,7 @@ import click
 from cylx.cli.documents import called_by_file
 from cylx.cli.failures import answer
 from cylx.cli.group import ExampleCommand
-from cylx.cli.options import debug_option, json_option
+from cylx.cli.options import complete_files, debug_option, json_option
 
 if TYPE_CHECKING:
     from cylx.evaluation import Difference
@@ -25,8 +25,8 @@ _TOLERANCE = click.FloatRange(min=0)
         "cylx diff before.json after.json --radius 0.001 --json",
     ],
 )
-@click.argument("a")
-@click.argument("b")
+@click.argument("a", shell_complete=complete_files)
+@click.argument("b", shell_complete=complete_files)
 @click.option(
     "--angle", "angle_deg", type=_TOLERANCE, default=0.1, show_default=True, help="Between the axes, degrees."
 )

@@ -11,7 +11,7 @@ import click
 from cylx.cli.documents import called_by_file
 from cylx.cli.failures import answer, tell
 from cylx.cli.group import ExampleCommand
-from cylx.cli.options import debug_option, json_option
+from cylx.cli.options import complete_files, debug_option, json_option
 
 if TYPE_CHECKING:
     from cylx.evaluation import Evaluation
@@ -27,8 +27,8 @@ _ERROR = click.FloatRange(min=0)
         "cylx evaluate room.cylinders.json room.truth.json --min-f1 0.99 --max-angle 0.1",
     ],
 )
-@click.argument("result")
-@click.argument("truth")
+@click.argument("result", shell_complete=complete_files)
+@click.argument("truth", shell_complete=complete_files)
 @click.option("--angle", "angle_deg", type=float, default=5.0, show_default=True, help="A match is closer, degrees.")
 @click.option("--offset", type=float, default=0.25, show_default=True, help="A match is closer, in radii.")
 @click.option("--radius", type=float, default=0.15, show_default=True, help="A match is closer, relative radius.")

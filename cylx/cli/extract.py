@@ -9,7 +9,7 @@ import click
 
 from cylx.cli.failures import describe_failure, tell
 from cylx.cli.group import ExampleCommand
-from cylx.cli.options import configured, debug_option, overwrite_option, talking
+from cylx.cli.options import complete_files, configured, debug_option, overwrite_option, talking
 from cylx.cli.outputs import Job, check_apart, check_outputs, plan_jobs, write_job
 from cylx.cli.stopwatch import Stopwatch, peak_memory
 from cylx.errors import BatchError, CylxError, NothingFoundError
@@ -23,22 +23,36 @@ if TYPE_CHECKING:
 @click.command(
     cls=ExampleCommand, examples=["cylx extract scan.ply", "cylx extract scans/*.ply --radius 0.01:0.2 -o results/"]
 )
-@click.argument("scans", metavar="SCAN...", nargs=-1, required=True)
+@click.argument("scans", metavar="SCAN...", nargs=-1, required=True, shell_complete=complete_files)
 @click.option(
-    "-o", "--output", metavar="FILE", help="The JSON; - for standard output, or a folder.  [default: beside the scan]"
+    "-o",
+    "--output",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="The JSON; - for standard output, or a folder.  [default: beside the scan]",
 )
 @click.option(
     "--annotate/--no-annotate",
     default=None,
     help="Write the cloud with the cylinder of each point.  [default: yes, unless the JSON goes to standard output]",
 )
-@click.option("--annotated", metavar="FILE", help="Name of the annotated PLY.  [default: beside the JSON]")
+@click.option(
+    "--annotated",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Name of the annotated PLY.  [default: beside the JSON]",
+)
 @configured
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
 @click.option(
     "--require", type=click.IntRange(min=1), metavar="N", help="Exit with 5 if fewer cylinders are found; still write."
 )
-@click.option("--profile", metavar="FILE", help="Write seconds per stage and peak memory as JSON.")
+@click.option(
+    "--profile",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Write seconds per stage and peak memory as JSON.",
+)
 @overwrite_option
 @talking
 @debug_option

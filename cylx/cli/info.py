@@ -9,7 +9,7 @@ import click
 
 from cylx.cli.failures import answer, tell
 from cylx.cli.group import ExampleCommand
-from cylx.cli.options import debug_option, json_option
+from cylx.cli.options import complete_files, debug_option, json_option
 from cylx.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command(cls=ExampleCommand, examples=["cylx info scan.ply", "cylx info scan.ply --json | jq .scene.spacing"])
-@click.argument("scan")
+@click.argument("scan", shell_complete=complete_files)
 @click.option(
     "--seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Seed of the measurement."
 )

@@ -7,6 +7,8 @@
 | `overwrite_option` | `--overwrite` | `overwrite`, a bool |
 | `json_option` | `--json` | `as_json`, a bool |
 | `debug_option` | `--debug` | nothing |
+
+`complete_files` lets the shell complete the file names of an argument or option.
 """
 
 from __future__ import annotations
@@ -26,6 +28,8 @@ PRESETS = ("auto", "paper")
 
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     BoundsType = click.ParamType[Bounds]
 else:
     BoundsType = click.ParamType  # not generic in older versions
@@ -61,6 +65,13 @@ class RadiusRange(BoundsType):
         return radius
 
 
+def complete_files(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    """Tell the shell to complete a file name."""
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(incomplete, type="file")]
+
+
 def configured(command: Command) -> Command:
     """Add the options of the configuration; the command gets `settings`."""
 
@@ -88,7 +99,13 @@ def configured(command: Command) -> Command:
 
 
 _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
-    click.option("-c", "--config", metavar="FILE", help="YAML file; 'cylx config init' writes one."),
+    click.option(
+        "-c",
+        "--config",
+        metavar="FILE",
+        shell_complete=complete_files,
+        help="YAML file; 'cylx config init' writes one.",
+    ),
     click.option(
         "--preset",
         type=click.Choice(PRESETS),

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import click
 
 from cylx.cli.group import ExampleGroup
-from cylx.cli.options import Bounds, RadiusRange, debug_option, overwrite_option
+from cylx.cli.options import Bounds, RadiusRange, complete_files, debug_option, overwrite_option
 from cylx.cli.outputs import TRUTH, check_apart
 from cylx.errors import UsageError
 
@@ -75,7 +75,7 @@ def synth() -> None:
 
 
 @synth.command(examples=["cylx synth single can.ply", "cylx synth single can.xyz --theta 90 --sigma 0.005 --p 0.1"])
-@click.argument("out")
+@click.argument("out", shell_complete=complete_files)
 @click.option("--points", type=int, default=10000, show_default=True, help="Number of points.")
 @click.option("--height", type=float, default=4.0, show_default=True, help="Height of the cylinder, in radii.")
 @click.option("--sigma", type=float, default=0.01, show_default=True, help="Noise of a point, in radii.")
@@ -104,7 +104,7 @@ def single(
 
 
 @synth.command(examples=["cylx synth multi room.ply --cylinders 10", "cylx synth multi room.ply --scale 1000"])
-@click.argument("out")
+@click.argument("out", shell_complete=complete_files)
 @click.option("--points", type=int, default=100000, show_default=True, help="Number of points.")
 @click.option("--cylinders", type=int, default=5, show_default=True, help="Number of cylinders.")
 @click.option("--planes", type=int, default=1, show_default=True, help="Floor, four walls and ceiling: 0 to 6 of them.")
