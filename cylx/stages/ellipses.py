@@ -75,7 +75,7 @@ def split_pieces(points: FloatArray, link: float) -> list[IndexArray]:
     Returns
     -------
     list of ndarray of int64
-        Indices of the points of each piece, in the order of their first points.
+        Indices of the points of each piece; the pieces come by where they are, not by the order of the points.
     """
     if len(points) == 0:
         return []
