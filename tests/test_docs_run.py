@@ -1,0 +1,157 @@
+"""The code blocks of the documentation are run, and give what the pages show.
+
+Bash and Python blocks of a page are run in their order, in a folder with the files of `sample_data` that a fresh clone
+has. A text block after one of them is its output, a JSON block after `<!-- from FILE: KEYS -->` a part of a file: the
+words must agree, the numbers nearly. `--regen` writes them anew.
+"""
+
+import contextlib
+import io
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [
+    path for path in PAGES if path.name != "benchmarks.md"
+]  # its commands take long and have a runner of their own
+RUN, READ = {"bash", "python"}, {"text", "json", "yaml"}
+NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?")
+
+
+class Block(NamedTuple):
+    """A fenced block: its language, its text and where that is, what is noted and what stands before it."""
+
+    language: str
+    text: str
+    start: int
+    end: int
+    source: str
+    follows: bool
+
+
+def blocks_of(page):
+    """Give the fenced blocks of a page; a block follows the one before it if nothing is between them."""
+    last = -1
+    for found in re.finditer(r"(?:<!-- from (.*?) -->\n)?^```(\w*)\n(.*?)^```$", page, re.DOTALL | re.MULTILINE):
+        between = page[last : found.start()].strip() if last >= 0 else "the beginning"
+        yield Block(found[2], found[3], found.start(3), found.end(3), found[1] or "", not between)
+        last = found.end()
+
+
+def same(shown, found):
+    """Tell whether two texts have the same words and nearly the same numbers."""
+    numbers = [[float(number) for number in NUMBER.findall(text)] for text in (shown, found)]
+    words = [re.sub("─+", "─", NUMBER.sub("#", text)).split() for text in (shown, found)]
+    return words[0] == words[1] and all(
+        math.isclose(a, b, rel_tol=0.05, abs_tol=2e-3) for a, b in zip(*numbers, strict=True)
+    )
+
+
+def test_what_counts_as_the_same():
+    assert same("a 1.00 -0.5\n───", "a  1.01   -0.5  ─")
+    assert not same("a 1.0", "a 1.2")
+    assert not same("a 1.0", "b 1.0")
+    assert not same("a 1.0", "a 1.0 1.0")
+
+
+def without_installing(line):
+    """Leave out of a line what installs: the tests run in what is installed already."""
+    if not line.startswith("pip install"):
+        return line
+    rest = line.partition(" && ")[2]
+    return "" if rest.startswith("pytest") else rest
+
+
+def shorten(value):
+    """Cut the digits of numbers that nobody reads."""
+    if isinstance(value, float):
+        return float(f"{value:.5g}")
+    if isinstance(value, list):
+        return [shorten(item) for item in value]
+    return {key: shorten(item) for key, item in value.items()} if isinstance(value, dict) else value
+
+
+def excerpt(source, folder):
+    """Give a part of a JSON file, one key a line, its digits cut."""
+    file, _, keys = source.partition(": ")
+    keys, _, left_out = keys.partition(", without ")
+    value = json.loads((folder / file).read_text(encoding="utf-8"))
+    for key in keys.split():
+        value = value[int(key) if isinstance(value, list) else key]
+    value.pop(left_out, None)
+    text = json.dumps(shorten(value), indent=2, ensure_ascii=False)
+    return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
+
+
+@pytest.fixture
+def clone(tmp_path):
+    """A folder with `sample_data` as a fresh clone has it, and without what somebody extracted there."""
+    listed = subprocess.run(
+        ["git", "ls-files", "-co", "--exclude-standard", "sample_data"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    everything = (path.relative_to(ROOT) for path in (ROOT / "sample_data").rglob("*") if path.is_file())
+    for name in listed.stdout.split() if listed.returncode == 0 else everything:
+        if (ROOT / name).is_file():
+            (tmp_path / "clone" / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / name, tmp_path / "clone" / name)
+    return tmp_path / "clone"
+
+
+@pytest.fixture
+def bash(clone, tmp_path):
+    """Run a text by bash in the clone, with `cylx` and `python` of this checkout; gives both its streams."""
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    for name, command in (("cylx", f'"{sys.executable}" -m cylx'), ("python", f'"{sys.executable}"')):
+        (tools / name).write_text(f'#!/bin/sh\nexec {command} "$@"\n', encoding="utf-8")
+        (tools / name).chmod(0o755)
+    path = os.pathsep.join([str(tools), os.environ["PATH"]])
+    env = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
+
+    def run(text):
+        text = "\n".join(map(without_installing, text.splitlines()))
+        command = ["bash", "-euo", "pipefail", "-c", text]
+        done = subprocess.run(
+            command, cwd=clone, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=120, check=False
+        )
+        assert done.returncode == 0, f"{text}\n{done.stdout.decode()}"
+        return done.stdout.decode()
+
+    return run
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="the pages are written for bash, which is not here")
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_the_code_blocks_run_and_give_what_is_shown(path, bash, clone, monkeypatch, request):
+    monkeypatch.chdir(clone)
+    page = path.read_text(encoding="utf-8")
+    output, names, stale = None, {"__name__": "page"}, []
+    for block in blocks_of(page):
+        assert block.language in RUN | READ, f"```{block.language}: a language that nobody runs or reads"
+        if block.language == "bash":
+            output = bash(block.text)
+        elif block.language == "python":
+            with contextlib.redirect_stdout(io.StringIO()) as stdout:
+                exec(compile(block.text, str(path), "exec"), names)
+            output = stdout.getvalue()
+        elif block.source or (block.language == "text" and block.follows and output is not None):
+            found = excerpt(block.source, clone) if block.source else output
+            stale += [] if same(block.text, found) else [(block, found)]
+            output = None
+    if request.config.getoption("--regen"):
+        for block, found in reversed(stale):
+            page = page[: block.start] + found + page[block.end :]
+        path.write_text(page, encoding="utf-8", newline="\n")
+        stale = []
+    assert [found for _, found in stale] == [block.text for block, _ in stale], "pytest tests/test_docs_run.py --regen"
