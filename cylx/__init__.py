@@ -41,7 +41,10 @@ _HOMES = {
     "write_annotated": "cylx.io",
 }
 
-__all__ = ["__version__", *sorted(_HOMES)]
+__all__ = [  # noqa: PLE0604  the names of a table are strings
+    "__version__",
+    *sorted(_HOMES),
+]
 
 
 def __getattr__(name: str) -> object:

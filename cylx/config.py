@@ -138,34 +138,22 @@ class AveragingConfig(Section):
 
 
 class VerificationConfig(Section):
-    """Measured properties that tell cylinders from what looks like one; each can be switched off by `null`."""
+    """What a cylinder must show to be accepted: its confidence, and limits that hold whatever the confidence."""
 
     enabled: bool = True
     """Verify at all; the paper does not."""
-    min_inliers: Annotated[int, Field(ge=0)] = 60
-    """Fewest points of an accepted cylinder; half as many suffice for a cluster of payoff 0.5."""
-    min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 25.0
+    min_confidence: Share = 0.5
+    """Least confidence. Raising it gives fewer false cylinders and more missed ones."""
+    min_inliers: Annotated[int, Field(ge=0)] = 30
+    """Fewest points of a cylinder."""
+    min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 20.0
     """Smallest angle about the axis that must be covered, degrees."""
-    min_height: Annotated[Number, Field(ge=0)] = 0.5
+    min_height: Annotated[Number, Field(ge=0)] = 0.4
     """Smallest visible length, in radii."""
-    max_noise_ratio: Positive | None = 1.3
-    """Largest ratio of the residual's standard deviation to the noise; form errors of about 1 % of r come on top."""
-    max_lack_of_fit: Positive | None = 2.5
-    """Largest chi-square per cell of the mean residuals over the surface; 1 is perfect."""
-    max_inside: Number | None = 0.15
-    """Most points inside, as a share of those on the surface, median over ten pieces of the height."""
-    max_outside: Number | None = 0.5
-    """Most points just outside, as a share of those on the surface, median over ten pieces of the height."""
-    max_tangent: Number | None = 0.6
-    """Most points that go on tangentially past both ends of the arc, as a share of the arc's own density."""
-    min_curvature: Number | None = 10.0
-    """Smallest ratio of the curvature to its standard deviation: tells a cylinder from a plane."""
-    max_slope: Number | None = 0.03
-    """Largest change of the radius along the axis: tells a cylinder from a cone."""
-    max_bulge: Number | None = 0.15
-    """Largest curvature along the axis times the radius: tells a cylinder from a sphere, which has 1."""
-    min_agreement: Share | None = 0.6
-    """Smallest share of the curvature windows along the cylinder that agree with it, give or take a standard error."""
+    max_slope: Annotated[Number, Field(ge=0)] = 0.03
+    """Largest change of the radius along the axis, beyond three standard errors: tells a cylinder from a cone."""
+    max_bulge: Annotated[Number, Field(ge=0)] = 0.15
+    """Largest curvature along the axis times the radius, beyond three standard errors; a sphere has 1."""
 
 
 class Config(Section):

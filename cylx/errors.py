@@ -1,7 +1,7 @@
 """Every error a user can meet, with its exit code.
 
-Each error names the place, the fault and the remedy in one line. Whatever is not a `CylxError` is a bug of ours and keeps
-its traceback.
+Each error names the place, the fault and the remedy in one line. Whatever is not a `CylxError` is a bug of ours and
+keeps its traceback.
 """
 
 from typing import ClassVar

@@ -1,8 +1,8 @@
 """Evolutionary games on a payoff matrix: from payoffs to a stable population. Knows no cylinders.
 
-A population x on the simplex evolves towards more mean payoff x' A x. With a zero diagonal the supports of its stable states are
-dominant sets, the clusters of the pairwise similarity A (Pavan and Pelillo); with a unit diagonal every stable state is a single
-strategy, so the answer depends on when one stops.
+A population x on the simplex evolves towards more mean payoff x' A x. With a zero diagonal the supports of its stable
+states are dominant sets, the clusters of the pairwise similarity A (Pavan and Pelillo); with a unit diagonal every
+stable state is a single strategy, so the answer depends on when one stops.
 """
 
 from __future__ import annotations
@@ -103,8 +103,8 @@ def evolve(
     max_iterations : int
         Most steps.
     tolerance : float
-        Stop when a step changes the population by less than this (replicator, sum of absolute changes), or when no strategy could
-        gain more than this (infection-immunization).
+        Stop when a step changes the population by less than this (replicator, sum of absolute changes), or when no
+        strategy could gain more than this (infection-immunization).
     start : ndarray of shape (M,), optional
         First population; uniform by default.
 
@@ -190,7 +190,7 @@ class SparsePayoff:
     def degrees(self) -> FloatArray:
         """Give the sum of each row, shape (M,)."""
         rows = np.repeat(np.arange(len(self._place)), np.diff(self.pointers))
-        return np.bincount(rows, weights=self.values, minlength=len(self._place))
+        return np.asarray(np.bincount(rows, self.values, minlength=len(self._place)), dtype=np.float64)
 
     def block(self, nodes: IndexArray) -> FloatArray:
         """Give the payoffs among a few strategies, shape (m, m)."""

@@ -23,8 +23,9 @@ REACH = 4.0
 def screw_payoff(models: FloatArray, parents: IndexArray, scale: float, min_ratio: float) -> FloatArray:
     """Give the paper's payoff (eq. 2, 5 and 6) of all pairs, shape (M, M), with a zero diagonal.
 
-    Lengths are measured in the median radius of the candidates and from the middle of their points: eq. 1 mixes radians with
-    lengths and depends on the origin, and so the paper's own experiments, a cylinder of radius 1 at the origin, are met exactly.
+    Lengths are measured in the median radius of the candidates and from the middle of their points: eq. 1 mixes radians
+    with lengths and depends on the origin, and so the paper's own experiments, a cylinder of radius 1 at the origin,
+    are met exactly.
 
     Parameters
     ----------

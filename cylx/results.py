@@ -145,6 +145,7 @@ class ResultCylinder(Part):
             coverage_deg=min(degrees(fit.coverage), 360.0),
             support=int(fit.support),
             payoff=float(fit.payoff),
+            confidence=fit.confidence,
             evidence=evidence or None,
         )
 

@@ -1,7 +1,7 @@
 """What a cloud says about itself: its spacing, its noise, its own frame, and so the meaning of every `null`.
 
-The frame has the spacing as its unit, the corner of the cloud as its zero and the Morton curve as the order of the points. All
-stages work in it, which is why unit, origin and order of the points do not change a result.
+The frame has the spacing as its unit, the corner of the cloud as its zero and the Morton curve as the order of the
+points. All stages work in it, which is why unit, origin and order of the points do not change a result.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def check_usable(points: FloatArray, place: str) -> None:
 
 
 def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray, float]:
-    """Sort points along the Morton curve of their own bounding cube, which makes them independent of the order they came in.
+    """Sort points along the Morton curve of their own bounding cube: an order that does not depend on the given one.
 
     Returns
     -------
@@ -80,8 +80,9 @@ def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexAr
 def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
     """Read spacing and noise off a cloud.
 
-    Quadrics are fitted to small neighbourhoods: the residuals show the noise, the density shows the spacing. The noise is the mode
-    over the neighbourhoods, because edges and contacts of surfaces are thicker than a surface and only the surfaces agree.
+    Quadrics are fitted to small neighbourhoods: the residuals show the noise, the density shows the spacing. The noise
+    is the mode over the neighbourhoods, because edges and contacts of surfaces are thicker than a surface and only the
+    surfaces agree.
 
     Parameters
     ----------
@@ -278,7 +279,7 @@ def _nearest(
 
 
 def _quadric_residuals(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Fit a quadric over the plane of each patch (m, k, 3); give sd and scaled MAD of the residuals, and in-plane rms."""
+    """Fit a quadric to each patch (m, k, 3); give sd and scaled MAD of the residuals, and the patch's in-plane rms."""
     count = patches.shape[1]
     offsets = patches - patches.mean(axis=1, keepdims=True)
     _, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", offsets, offsets))

@@ -9,7 +9,7 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "cli", "config", "cylx", "errors", "evaluation", "game", "geometry", "io", "payoff", "pipeline", "records",
+    "api", "cli", "config", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "payoff", "pipeline", "records",
     "results",
     "scene", "stages", "synthetic",
 }  # fmt: skip
@@ -19,7 +19,7 @@ MAY_IMPORT = {
     "cli": EVERYTHING,
     "api": {"config", "errors", "io", "pipeline", "records"},
     "pipeline": {"config", "errors", "game", "geometry", "records", "scene", "stages"},
-    "stages": {"config", "errors", "game", "geometry", "payoff", "records"},
+    "stages": {"config", "errors", "evidence", "game", "geometry", "payoff", "records"},
     "payoff": {"game", "geometry"},
     "scene": {"config", "errors", "geometry", "records"},
     "results": {"config", "cylx", "errors", "geometry", "records"},
@@ -28,6 +28,7 @@ MAY_IMPORT = {
     "config": {"errors"},
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors"},
+    "evidence": set(),
     "geometry": set(),
     "game": set(),
     "errors": set(),

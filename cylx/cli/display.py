@@ -178,7 +178,7 @@ def _console(stream: object) -> Console:
     return console
 
 
-_CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "payoff", "direction"]
+_CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "confidence", "direction"]
 
 
 def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
@@ -186,7 +186,14 @@ def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
     shape = fit.cylinder
     direction = " ".join(f"{x:.3f}".replace("-0.000", "0.000") for x in shape.direction)
     numbers = [f"{shape.radius:.5g}", f"{shape.height:.4g}", f"{fit.coverage * 57.29577951308232:.0f}°"]
-    return [str(index), *numbers, str(fit.inliers), f"{fit.rmse:.3g}", f"{fit.payoff:.2f}", direction]
+    return [
+        str(index),
+        *numbers,
+        str(fit.inliers),
+        f"{fit.rmse:.3g}",
+        "-" if fit.confidence is None else f"{fit.confidence:.2f}",
+        direction,
+    ]
 
 
 def _stage_rows(extraction: Extraction) -> list[list[str]]:

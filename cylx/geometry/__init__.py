@@ -1,0 +1,1 @@
+"""Shapes and their laws: arrays in, shapes out."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
@@ -64,14 +63,14 @@ class Cylinder:
         """Upper end of the axis segment, shape (3,)."""
         return self.point + 0.5 * self.height * self.direction
 
-    def moved(self, origin: Any, scale: float = 1.0) -> Cylinder:
-        """Give the cylinder in a frame whose unit is `1 / scale` and whose zero lies at `-origin`: x -> scale x + origin."""
+    def moved(self, origin: ArrayLike, scale: float = 1.0) -> Cylinder:
+        """Give the cylinder where x -> scale x + origin takes its points."""
         return Cylinder(
             scale * self.point + np.asarray(origin), self.direction, scale * self.radius, scale * self.height
         )
 
 
-def canonical_direction(direction: Any) -> FloatArray:
+def canonical_direction(direction: ArrayLike) -> FloatArray:
     """Return the unit vector along `direction` whose component of largest magnitude is positive.
 
     Parameters
@@ -92,7 +91,9 @@ def canonical_direction(direction: Any) -> FloatArray:
     return np.asarray(np.where(largest < 0, -vectors, vectors) + 0.0, dtype=np.float64)
 
 
-def cylinder_coordinates(points: FloatArray, point: Any, direction: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+def cylinder_coordinates(
+    points: FloatArray, point: ArrayLike, direction: ArrayLike
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Give each point's height along the axis, distance from the axis and angle about it.
 
     Parameters
@@ -118,7 +119,7 @@ def cylinder_coordinates(points: FloatArray, point: Any, direction: Any) -> tupl
     return offsets @ direction, np.hypot(x, y), np.arctan2(y, x)
 
 
-def axis_frame(direction: Any) -> tuple[FloatArray, FloatArray]:
+def axis_frame(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Give two unit vectors that make a right-handed frame with a unit direction.
 
     Returns

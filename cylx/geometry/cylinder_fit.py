@@ -1,8 +1,9 @@
 """Robust orthogonal-distance fit of a cylinder to points: one kernel for candidates, clusters and pieces.
 
-Minimises sum rho(d_i - r) over the five degrees of freedom of a cylinder, d_i being the distance of point i from the axis, by
-Gauss-Newton steps under Tukey's biweight. Started in the basin it reaches the Cramer-Rao bound; the radius keeps the bias
-sigma^2 / (2 r) of orthogonal distances, which `unbiased_radius` takes off (Al-Sharadqah and Chernov, EJS 3, 2009).
+Minimises sum rho(d_i - r) over the five degrees of freedom of a cylinder, d_i being the distance of point i from the
+axis, by Gauss-Newton steps under Tukey's biweight. Started in the basin it reaches the Cramer-Rao bound; the radius
+keeps the bias sigma^2 / (2 r) of orthogonal distances, which `unbiased_radius` takes off (Al-Sharadqah and Chernov, EJS
+3, 2009).
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ TUKEY_SPREAD = 1.0989
 
 
 class Kernel(NamedTuple):
-    """Width of the biweight over the steps of a fit: from `start`, to `decay` times the last and to `tuning` times the spread.
+    """Width of the biweight over the steps of a fit.
+
+    Each step takes `decay` times the last width or `tuning` times the spread, whichever is less.
 
     Parameters
     ----------
@@ -57,7 +60,7 @@ def _accumulate(
     row: FloatArray,
     sums: FloatArray,
 ) -> None:
-    """Fill the weighted normal equations of one Gauss-Newton step; `sums` gets weights, squares and the largest height."""
+    """Fill the weighted normal equations of a step; `sums` gets the weights, the squares and the largest height."""
     fill_frame(model[3:6], frame)
     for a in range(5):
         right[a] = 0.0
@@ -109,7 +112,7 @@ def _advance(model: FloatArray, right: FloatArray, frame: FloatArray, reach: flo
     for d in range(3):
         model[3 + d] /= length
     model[6] += damping * right[4]
-    return size
+    return float(size)
 
 
 @njit(cache=True, nogil=True)
@@ -130,7 +133,8 @@ def fit_in_place(
 ) -> float:
     """Fit `model` = (point, direction, radius), shape (7,), to points[:n] whose height lies in [low, high].
 
-    Heights are measured from the model's point along its direction. `normal` (5, 5), `right` (5,) and `frame` (2, 3) are scratch.
+    Heights are measured from the model's point along its direction. `normal` (5, 5), `right` (5,) and `frame` (2, 3)
+    are scratch.
 
     Returns
     -------
@@ -151,7 +155,7 @@ def fit_in_place(
         if (decay == 1.0 and size < 1e-9 * spread) or (width <= floor and size < 1e-2 * spread and decay < 1.0):
             break
         width = max(floor, min(decay * width, tuning * spread))
-    return spread
+    return float(spread)
 
 
 def fit_cylinder(
@@ -203,8 +207,8 @@ def candidate_quality(
 ) -> None:
     """Fill `quality` (4,) with what supports a cylinder among points[:n].
 
-    The inliers (within `width` of the surface), the extent of their heights, the share of the angular `bins` that they fill, and
-    the number of points further in.
+    The inliers (within `width` of the surface), the extent of their heights, the share of the angular `bins` that they
+    fill, and the number of points further in.
     """
     fill_frame(model[3:6], frame)
     for a in range(len(bins)):

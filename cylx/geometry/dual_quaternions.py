@@ -1,7 +1,7 @@
 """Unit dual quaternions: rigid motions as screws, their logarithm, their average (appendix A).
 
-A dual quaternion is an array of shape (..., 8): the real quaternion (w, x, y, z), then the dual one. A motion is the real part
-q0 with the dual part t q0 / 2, t being the pure quaternion of the translation.
+A dual quaternion is an array of shape (..., 8): the real quaternion (w, x, y, z), then the dual one. A motion is the
+real part q0 with the dual part t q0 / 2, t being the pure quaternion of the translation.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def normalised(q: FloatArray) -> FloatArray:
 def screw(axis: FloatArray, foot: FloatArray, angle: FloatArray, shift: FloatArray) -> FloatArray:
     """Give the motion that turns by `angle` about the line (foot, axis) and moves by `shift` along it (A.2).
 
-    The text of (A.2) has the dual angle 2 beta + 2 eps |T|, whose half in the cosine would apply the motion twice; the dual angle
-    meant is beta + eps |T|.
+    The text of (A.2) has the dual angle 2 beta + 2 eps |T|, whose half in the cosine would apply the motion twice; the
+    dual angle meant is beta + eps |T|.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def logarithm(q: FloatArray) -> FloatArray:
     Returns
     -------
     ndarray of shape (..., 6)
-        Vector parts of the real and the dual quaternion; the scalar parts are zero. The sign of `q` is chosen so that the
-        rotation is at most pi, the shorter of the two paths of (A.4).
+        Vector parts of the real and the dual quaternion; the scalar parts are zero. The sign of `q` is chosen so that
+        the rotation is at most pi, the shorter of the two paths of (A.4).
     """
     q = np.where(q[..., :1] < 0, -q, q)
     sine = np.linalg.norm(q[..., 1:4], axis=-1, keepdims=True)
@@ -84,7 +84,8 @@ def logarithm(q: FloatArray) -> FloatArray:
     small = sine < 1e-12
     safe = np.where(small, 1.0, sine)
     factor = np.where(small, 1.0, half / safe)
-    # d = slide along the axis; from the scalar dual part -d sin(half), and from the part of the dual vector along the axis
+    # d = slide along the axis; from the scalar dual part -d sin(half), and from the part of the dual vector along the
+    # axis
     axis = q[..., 1:4] / safe
     slide = np.where(small, 0.0, -q[..., 4:5] / safe)
     moment = (q[..., 5:8] - slide * q[..., :1] * axis) / safe

@@ -68,6 +68,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
     """Fit an ellipse to points by direct least squares.
 
     Minimises the algebraic distance under 4 a c - b^2 = 1, in the numerically stable form, after centring and scaling.
+    Points of a hyperbola get an ellipse, too, which is far from them.
 
     Parameters
     ----------

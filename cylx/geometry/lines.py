@@ -28,10 +28,11 @@ def common_perpendicular(
     Returns
     -------
     first_feet, second_feet : ndarray of shape (..., 3)
-        m1 and m2 of section 3.1: the points of the lines that are closest to each other. For parallel lines the foot is the first
-        line's point.
+        m1 and m2 of section 3.1: the points of the lines that are closest to each other. For parallel lines the foot is
+        the first line's point.
     angle : ndarray of shape (...)
-        beta, in [0, pi / 2]; by the arc tangent, which is exact for small angles where the paper's arc sine is not.
+        beta, in [0, pi / 2]; by the arc tangent, which is exact everywhere: the paper's arc sine is not near a right
+        angle.
     axis : ndarray of shape (..., 3)
         s, unit, orthogonal to both lines; the rotation by `angle` about it turns the first direction into the second.
     """

@@ -1,7 +1,7 @@
 """Points in Morton order: a linear octree without a tree.
 
-Along the Morton (Z-order) curve the points of a cube of side 2^k are one contiguous run, at every k at once. So one sort gives
-voxels and cells of all octaves, and an order of the points that does not depend on the order they came in.
+Along the Morton (Z-order) curve the points of a cube of side 2^k are one contiguous run, at every k at once. So one
+sort gives voxels and cells of all octaves, and an order of the points that does not depend on the order they came in.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """The quadric over a small piece of surface, and the cylinder that osculates it.
 
-Over its own plane a small piece of surface is z = a x^2 + b x y + c y^2 + d x + e y + f. The shape operator of this quadric has
-the principal curvatures and directions; for a cylinder one curvature is 0, along the axis, and the other 1 / r. So a single small
-least-squares problem gives axis, radius and position, without normals.
+Over its own plane a small piece of surface is z = a x^2 + b x y + c y^2 + d x + e y + f. The shape operator of this
+quadric has the principal curvatures and directions; for a cylinder one curvature is 0, along the axis, and the other 1
+/ r. So a single small least-squares problem gives axis, radius and position, without normals.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ def fit_plane(
     Returns
     -------
     float
-        Share of the points within three noises, 0 if those that are do not scatter like noise: an arc of a thin pipe is flat
-        within three noises, too.
+        Share of the points within three noises, 0 if those that are do not scatter like noise: an arc of a thin pipe is
+        flat within three noises, too.
     """
     width = math.inf
     for _ in range(4):
@@ -73,16 +73,13 @@ def fit_plane(
             squares += height * height
     if inside == 0 or math.sqrt(squares / inside) > noise * (1.2 + 1.5 / math.sqrt(2.0 * inside)):
         return 0.0
-    return inside / n
+    return float(inside / n)
 
 
 @njit(cache=True, nogil=True)
 def _height(points: FloatArray, i: int, center: FloatArray, normal: FloatArray) -> float:
-    return (
-        (points[i, 0] - center[0]) * normal[0]
-        + (points[i, 1] - center[1]) * normal[1]
-        + (points[i, 2] - center[2]) * normal[2]
-    )
+    dx, dy, dz = points[i, 0] - center[0], points[i, 1] - center[1], points[i, 2] - center[2]
+    return float(dx * normal[0] + dy * normal[1] + dz * normal[2])
 
 
 @njit(cache=True, nogil=True)
@@ -160,7 +157,7 @@ def _fill_row(
     x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
     y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
     row[0], row[1], row[2], row[3], row[4], row[5] = x * x, x * y, y * y, x, y, 1.0
-    return dx * normal[0] + dy * normal[1] + dz * normal[2]
+    return float(dx * normal[0] + dy * normal[1] + dz * normal[2])
 
 
 @njit(cache=True, nogil=True)

@@ -1,4 +1,4 @@
-"""The method on one screen: slice, ellipses, candidates, clustering, averaging; then verification, merging and labels."""
+"""The method on one screen: slice, ellipses, candidates, clustering, averaging; then what makes it trustworthy."""
 
 from __future__ import annotations
 
@@ -61,7 +61,8 @@ def extract_cylinders(
         candidates = Candidates.joined([windows, candidates_of_slices(fits, frame, radii, config, journal)])
     with journal.stage("clustering"):
         players = thin_candidates(candidates) if config.clustering.population == "local" else candidates
-        turns = Turns(CandidateGame(players, config.clustering), players, windows, ground, radii, config)
+        witnesses = windows if len(windows) else candidates
+        turns = Turns(CandidateGame(players, config.clustering), players, witnesses, ground, radii, config)
     with journal.stage("averaging"):
         findings = turns.play(journal)
     with journal.stage("merging"):

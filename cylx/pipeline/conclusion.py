@@ -18,7 +18,7 @@ def conclude(
     reports: list[StageReport],
     config: Config,
 ) -> Extraction:
-    """Label the points, number the cylinders by their inliers, and put everything into scene units.
+    """Label the points, number the cylinders by confidence, and put everything into scene units.
 
     Parameters
     ----------
@@ -37,7 +37,9 @@ def conclude(
     """
     labels, residuals = label_points([finding.segment for finding in findings], ground)
     counts = np.bincount(labels[labels >= 0], minlength=len(findings))
-    order = [int(i) for i in np.lexsort((np.arange(len(findings)), -counts)) if counts[i] > 0]
+    verified = config.verification.enabled
+    trust = np.array([finding.confidence if verified else 0.0 for finding in findings])
+    order = [int(i) for i in np.lexsort((np.arange(len(findings)), -counts, -trust)) if counts[i] > 0]
     squares = np.bincount(labels[labels >= 0], residuals[labels >= 0] ** 2, minlength=len(findings))
     fits = [
         CylinderFit(
@@ -47,6 +49,7 @@ def conclude(
             findings[i].coverage,
             findings[i].support,
             findings[i].payoff,
+            findings[i].confidence if verified else None,
             findings[i].measures,
         )
         for i in order

@@ -22,8 +22,8 @@ class Turns:
     game : CandidateGame
     players : Candidates
         Those in the game.
-    windows : Candidates
-        All curved windows: what a cylinder must agree with.
+    witnesses : Candidates
+        What a cylinder should agree with: all curved windows, which are drawn evenly over the surface.
     ground : Ground
         The cloud.
     radii : tuple of float
@@ -36,14 +36,14 @@ class Turns:
         self,
         game: CandidateGame,
         players: Candidates,
-        windows: Candidates,
+        witnesses: Candidates,
         ground: Ground,
         radii: tuple[float, float],
         config: Config,
     ) -> None:
         self._game = game
         self._players = players
-        self._windows = windows
+        self._witnesses = witnesses
         self._ground = ground
         self._radii = radii
         self._config = config
@@ -80,7 +80,7 @@ class Turns:
             joined, claimed = len(findings) - len(pieces), len(pieces) - len(kept)
         if self._config.averaging.refine:
             kept = [self._finish(finding) for finding in kept]
-        kept = sorted(kept, key=lambda finding: -len(finding.points))
+        kept = sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))
         beyond = kept[self._config.max_cylinders :] if self._config.max_cylinders else []
         kept = kept[: len(kept) - len(beyond)]
         rejected = {"joined": joined, "claimed by a better one": claimed, "beyond max_cylinders": len(beyond)}
@@ -110,17 +110,16 @@ class Turns:
         """Verify a segment; the first test it failed if it does not pass."""
         if not self._radii[0] <= segment.model[6] <= self._radii[1]:
             return "radius out of range"
-        share = agreement(self._windows, segment)
+        share = agreement(self._witnesses, segment)
         verdict = verify(segment, self._ground, payoff, share, self._config.verification)
-        if self._config.verification.enabled and verdict.reasons:
-            return verdict.reasons[0]
-        if len(verdict.points) == 0:
-            return "too few points"
+        if not verdict.measures or (self._config.verification.enabled and verdict.reason):
+            return verdict.reason
         return Finding(
             segment,
             verdict.points,
             support,
             payoff,
+            verdict.confidence,
             verdict.coverage,
             verdict.offset_error,
             verdict.tilt_error,

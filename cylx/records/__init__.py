@@ -1,7 +1,7 @@
 """What travels between the stages: shapes with their evidence, and the counts of what was dropped on the way.
 
-Many things of one kind travel as a structure of arrays (`Candidates`); the few cylinders that come out travel one by one. All
-records are frozen: a stage makes new ones and never changes those it was given.
+Many things of one kind travel as a structure of arrays (`Candidates`); the few cylinders that come out travel one by
+one. All records are frozen: a stage makes new ones and never changes those it was given.
 """
 
 from cylx.records.clouds import Frame, Ground, PointCloud, Scene, Source

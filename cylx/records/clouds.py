@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
@@ -44,7 +44,8 @@ class PointCloud:
     points : ndarray of shape (N, 3), float64
         The finite points, in scene units, in the order of the file. Made read-only.
     table : ndarray of shape (rows,), structured, or None
-        Every property of every row as read, rows without finite coordinates included; None if there is nothing but `points`.
+        Every property of every row as read, rows without finite coordinates included; None if there is nothing but
+        `points`.
     valid : ndarray of shape (rows,), bool, or None
         Which rows of the file `points` are; None if all of them.
     source : Source
@@ -66,7 +67,7 @@ class PointCloud:
         object.__setattr__(self, "points", points)
 
     @classmethod
-    def from_array(cls, coordinates: Any) -> PointCloud:
+    def from_array(cls, coordinates: ArrayLike) -> PointCloud:
         """Make a cloud of an (N, 3) array; rows that are not finite are kept as rows without a label.
 
         Parameters
@@ -82,7 +83,7 @@ class PointCloud:
         array = np.asarray(coordinates, dtype=np.float64)
         if array.ndim != 2 or array.shape[1] != 3:
             raise ValueError(f"points must have shape (N, 3), not {array.shape}")
-        valid = np.isfinite(array).all(axis=1)
+        valid: MaskArray = np.asarray(np.isfinite(array).all(axis=1), dtype=np.bool_)
         return cls(array[valid], valid=None if valid.all() else valid)
 
     @property

@@ -56,8 +56,8 @@ class Candidates:
     Parameters
     ----------
     models : ndarray of shape (M, 7)
-        Point of the axis, unit direction, radius. The point is the place the candidate speaks for: the ellipse's centre, or the
-        axis point nearest to its window.
+        Point of the axis, unit direction, radius. The point is the place the candidate speaks for: the ellipse's
+        centre, or the axis point nearest to its window.
     parents : ndarray of shape (M,)
         Slice or window it comes from; candidates of one parent exclude each other (eq. 5).
     extents : ndarray of shape (M,)

@@ -57,6 +57,8 @@ class Finding:
         Candidates of its cluster.
     payoff : float
         Mean payoff of its cluster.
+    confidence : float
+        Probability that it is a cylinder.
     coverage : float
         Angle about the axis that is covered, radians.
     offset_error, tilt_error : float
@@ -69,6 +71,7 @@ class Finding:
     points: IndexArray
     support: int
     payoff: float
+    confidence: float
     coverage: float
     offset_error: float
     tilt_error: float
@@ -93,6 +96,8 @@ class CylinderFit:
         Candidates in its cluster.
     payoff : float
         Mean payoff of the cluster, in [0, 1].
+    confidence : float or None
+        Probability that it is a cylinder; None if it was not verified.
     evidence : mapping of str to float
         What the verification measured, by the name of the test.
     """
@@ -103,6 +108,7 @@ class CylinderFit:
     coverage: float
     support: int
     payoff: float
+    confidence: float | None = None
     evidence: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -113,11 +119,12 @@ class Extraction:
     Parameters
     ----------
     cylinders : tuple of CylinderFit
-        Ordered by inliers, descending; the index is the `id`.
+        Ordered by confidence, then inliers, descending; the index is the `id`.
     labels : ndarray of shape (N,), int32
         Cylinder of each finite point of the cloud, -1 for none.
     residuals : ndarray of shape (N,), float32
-        Signed distance of each labelled point to its cylinder's surface, scene units, + is outside; NaN without a label.
+        Signed distance of each labelled point to its cylinder's surface, scene units, + is outside; NaN without a
+        label.
     cloud : PointCloud
         What was looked at.
     scene : Scene

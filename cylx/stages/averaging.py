@@ -1,8 +1,8 @@
 """Clusters -> cylinders (section 3.4), and the fit of the average to all its points.
 
-The paper stops at the average of the winning candidates. A candidate uses only the points of one slice or window; fitted to all
-points about it, and followed along its axis for as long as the surface goes on, the average reaches the accuracy of a fit to the
-segmented cylinder.
+The paper stops at the average of the winning candidates. A candidate uses only the points of one slice or window;
+fitted to all points about it, and followed along its axis for as long as the surface goes on, the average reaches the
+accuracy of a fit to the segmented cylinder.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ ENOUGH = 6000
 """Points that suffice while a cylinder grows."""
 MANY = 20000
 """Points that suffice to judge it; the last fit takes all."""
-DEGREES_LOST = math.cos(math.radians(25.0))
+LEAST_COSINE = math.cos(math.radians(25.0))
+"""A fit whose axis turns further than this has left the candidates it came from."""
 ARC_BINS = 24
 
 
@@ -94,7 +95,7 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         if fit is None:
             return "no fit"
         model, spread = fit
-        if not (0.5 * first[6] <= model[6] <= 2.0 * first[6]) or abs(model[3:6] @ first[3:6]) < DEGREES_LOST:
+        if not (0.5 * first[6] <= model[6] <= 2.0 * first[6]) or abs(model[3:6] @ first[3:6]) < LEAST_COSINE:
             return "drifted away"
         spread = TUKEY_SPREAD * spread
         heights, distances, angles = cylinder_coordinates(points, model[:3], model[3:6])
@@ -162,6 +163,8 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
     # the average is as good as its candidates, so its surface is looked for in a wider shell than a fitted one's
     width = max(5.0 * ground.noise, 0.05 * radius)
     half = max(segment.half, 0.5 * radius)
+    low = high = 0.0
+    heights = distances = np.empty(0)
     for _ in range(GROWTH_STEPS):
         near = ground.cells.near_cylinder(model, -reach, reach, max(0.0, radius - width), radius + width)
         near = near[ground.may_be_on(near, radius)]
@@ -169,10 +172,10 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
         found = visible_extent(heights, angles, half, radius)
         if found is None:
             return "too few points"
-        if max(-found[0], found[1]) < 0.95 * reach:
+        low, high = found
+        if max(-low, high) < 0.95 * reach:
             break
         reach *= 2.0
-    low, high = found
     on = (heights >= low) & (heights <= high)
     spread = 1.4826 * float(np.median(np.abs(distances[on] - radius)))
     moved = np.concatenate([model[:3] + 0.5 * (low + high) * model[3:6], model[3:]])
@@ -190,7 +193,8 @@ def visible_extent(
 ) -> tuple[float, float] | None:
     """Find how far a surface goes on, by pieces of its height in which its arc is filled.
 
-    Density alone would follow a can along the table it touches; what counts is the share of the arc's angles that are filled.
+    Density alone would follow a can along the table it touches; what counts is the share of the arc's angles that are
+    filled.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Ellipse fits -> candidates: the two cylinders that cut a plane in an ellipse, and their polish on the points about them."""
+"""Ellipse fits -> candidates: the two cylinders that cut a plane in an ellipse, and their polish."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ CAPACITY = 4096
 
 
 def axes_of(fit: EllipseFit) -> FloatArray:
-    """Give the two possible axis directions of an ellipse (eq. 4): the normal turned about the minor axis by +-arccos(b / a).
+    """Give the two possible axis directions of an ellipse (eq. 4).
+
+    They are the plane's normal, turned about the minor axis by plus or minus arccos(b / a), the angle of eq. 3.
 
     Returns
     -------
@@ -96,7 +98,8 @@ def polish_candidates(
         which = np.flatnonzero(octave == level)
         part, good = rows[which], np.zeros(len(which), np.bool_)
         _polish(
-            frame.points[sample], cells, starts, side, frame.noise, *radius_range, config.min_inliers, config.min_share, part, good
+            frame.points[sample], cells, starts, side, frame.noise, *radius_range, config.min_inliers, config.min_share,
+            part, good
         )  # fmt: skip
         rows[which], kept[which] = part, good
     return Candidates(
@@ -138,7 +141,8 @@ def _polish(
                 around[a, d] = points[found[a], d] - center[d]
         floor = max(3.0 * noise, 0.01 * first)
         spread = fit_in_place(
-            around, n, model, -math.inf, math.inf, max(0.3 * first, 4.0 * noise), floor, 0.6, math.inf, 10, matrix, right, axes
+            around, n, model, -math.inf, math.inf, max(0.3 * first, 4.0 * noise), floor, 0.6, math.inf, 10, matrix,
+            right, axes
         )  # fmt: skip
         if (
             spread < 0.0

@@ -1,7 +1,7 @@
 """Candidates -> clusters: the game that candidates play (section 3.3).
 
-The paper's payoff and its dynamics over all candidates, or the same game at scale: a sparse payoff over the pairs within reach and
-local populations, one neighbourhood after the other.
+The paper's payoff and its dynamics over all candidates, or the same game at scale: a sparse payoff over the pairs
+within reach and local populations, one neighbourhood after the other.
 """
 
 from __future__ import annotations
@@ -185,7 +185,7 @@ def _agree(
 
 
 def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:
-    """Keep the best supported few of the candidates that say the same: same place within half a radius, same radius and direction.
+    """Keep the best supported few of the candidates that say the same.
 
     A large cylinder has thousands of equal candidates; the game needs enough of them to tell it from chance, not all.
 

@@ -1,8 +1,8 @@
 """Frame -> candidates: the second source beside the paper's slices.
 
-The paper leaves open where candidates come from (section 3.2). A window that is small against a cylinder holds a piece of a
-quadric, whose curvatures give the cylinder (`cylx.geometry.quadric`). Windows of all sizes are tried, coarse to fine; what is flat
-in a large window is not looked at again in smaller ones.
+The paper leaves open where candidates come from (section 3.2). A window that is small against a cylinder holds a piece
+of a quadric, whose curvatures give the cylinder (`cylx.geometry.quadric`). Windows of all sizes are tried, coarse to
+fine; what is flat in a large window is not looked at again in smaller ones.
 """
 
 from __future__ import annotations
@@ -214,7 +214,7 @@ def _center_window(
     around: FloatArray,
     inner: FloatArray,
 ) -> int:
-    """Copy a window's points, its seed at zero, to `around`, and those within `radius` to `inner`; give the number of these."""
+    """Copy a window's points, its seed at zero, to `around`, and those within `radius` to `inner`; count these."""
     m = 0
     for a in range(n):
         square = 0.0

@@ -15,8 +15,8 @@ FloatArray = NDArray[np.float64]
 def draw_planes(frame: Frame, config: SlicingConfig, seed: int) -> list[Plane]:
     """Draw N planes: normals evenly from the sphere, each through a point of the cloud.
 
-    The paper says no more than "random center and normal"; a centre drawn from the points cuts where there is something to cut,
-    however large the box about the cloud.
+    The paper says no more than "random center and normal"; a centre drawn from the points cuts where there is something
+    to cut, however large the box about the cloud.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Cylinders -> accepted, with reasons: measured properties that tell a cylinder from what only looks like one.
 
-Corners of boxes, strips of spheres, cones and pairs of planes give consistent false cylinders. None of the measures needs normals;
-each is reported under its name, whether it decided anything or not.
+Corners of boxes, strips of spheres, cones and pairs of planes give consistent false cylinders. None of the measures
+needs normals. No threshold decides alone: the measures are weighed into one confidence, and all of them are reported.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import VerificationConfig
+from cylx.evidence import weigh
 from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.records import Ground, Segment
 
@@ -24,18 +25,22 @@ PIECES = 10
 TRUNCATED = 0.9866
 """Standard deviation of a Gaussian cut off at three sigmas."""
 SECTORS = 36
+LEAST = 20
+"""Points on the surface without which nothing can be measured."""
 MANY = 20000
 """Points on the surface that suffice for the measures."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Verdict:
-    """What the verification measured of a segment.
+    """What the verification measured of a segment, and made of it.
 
     Parameters
     ----------
-    reasons : tuple of str
-        Names of the tests it failed; empty if it is accepted.
+    reason : str
+        What speaks most against it; empty if it is accepted.
+    confidence : float
+        Probability that it is a cylinder.
     measures : dict of str to float
         Name to value.
     coverage : float
@@ -46,17 +51,13 @@ class Verdict:
         Standard deviations of the axis, at its middle and in angle: frame units, radians.
     """
 
-    reasons: tuple[str, ...]
+    reason: str
+    confidence: float
     measures: dict[str, float]
     coverage: float
     points: NDArray[np.int64]
     offset_error: float = math.inf
     tilt_error: float = math.inf
-
-    @property
-    def accepted(self) -> bool:
-        """Whether no test failed."""
-        return not self.reasons
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,8 +88,15 @@ class Shell:
 
     def thinned(self, stride: int) -> Shell:
         """Give every so manyth point: shares and shapes stay, and cost what they should."""
-        arrays = (self.indices, self.heights, self.residuals, self.angles, self.on, self.flat)
-        return Shell(*(array[::stride] for array in arrays), self.deviation)
+        return Shell(
+            self.indices[::stride],
+            self.heights[::stride],
+            self.residuals[::stride],
+            self.angles[::stride],
+            self.on[::stride],
+            self.flat[::stride],
+            self.deviation,
+        )
 
 
 def look_at(segment: Segment, ground: Ground) -> Shell:
@@ -104,7 +112,11 @@ def look_at(segment: Segment, ground: Ground) -> Shell:
 
 
 def verify(
-    segment: Segment, ground: Ground, payoff: float, agreement: tuple[int, int], config: VerificationConfig
+    segment: Segment,
+    ground: Ground,
+    payoff: float,
+    agreement: tuple[int, int],
+    config: VerificationConfig,
 ) -> Verdict:
     """Measure a segment and judge it.
 
@@ -125,78 +137,49 @@ def verify(
     Verdict
     """
     whole = look_at(segment, ground)
-    noise = ground.noise
     points = whole.indices[whole.on]
-    count = len(points)
-    shell = whole.thinned(max(1, count // MANY))
+    shell = whole.thinned(max(1, len(points) // MANY))
+    if shell.on.sum() < LEAST:
+        return Verdict("too few points", 0.0, {}, 0.0, points)
     coverage, sectors = covered_angle(shell.angles[shell.on])
-    if count < 20:
-        return Verdict(("too few points",), {}, coverage, points)
-    radius, half = float(segment.model[6]), segment.half
-    residuals = shell.residuals[shell.on]
-    deviation = float(np.sqrt((residuals**2).mean())) / TRUNCATED
+    radius = float(segment.model[6])
+    deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
     shape = _shape(shell, segment, deviation)
     lack, structure = _lack_of_fit(shell, deviation)
     inside, outside = _emptiness(shell, radius)
     consistent, near = agreement
     measures = {
-        "noise_ratio": deviation / noise,
+        "noise_ratio": deviation / ground.noise,
         "lack_of_fit": lack,
-        "structure": structure / noise,
+        "structure": structure / ground.noise,
+        "structure_radii": structure / radius,
         "inside": inside,
         "outside": outside,
         "tangent": _tangent(shell, sectors, radius),
         "curvature": shape["curvature"],
         "slope": shape["slope"],
+        "slope_error": shape["slope_error"],
         "bulge": shape["bulge"],
-        "height_radii": 2.0 * half / radius,
-        "agreement": consistent / near if near else 1.0,
+        "bulge_error": shape["bulge_error"],
+        "height_radii": 2.0 * segment.half / radius,
+        "windows": float(near),
+        "agreement": (consistent + 1.0) / (near + 2.0),
     }
-    reasons = _judge(measures, shape, count, coverage, payoff, agreement, radius, noise, config)
-    return Verdict(reasons, measures, coverage, points, shape["offset_error"], shape["tilt_error"])
+    confidence, worst = weigh({**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff})
+    reason = _refusal(measures, len(points), coverage, config) or ("" if confidence >= config.min_confidence else worst)
+    return Verdict(reason, confidence, measures, coverage, points, shape["offset_error"], shape["tilt_error"])
 
 
-def _judge(
-    measures: dict[str, float],
-    shape: dict[str, float],
-    count: int,
-    coverage: float,
-    payoff: float,
-    agreement: tuple[int, int],
-    radius: float,
-    noise: float,
-    config: VerificationConfig,
-) -> tuple[str, ...]:
-    """Give the names of the tests that fail."""
-    # real objects deviate from a cylinder by about a hundredth of the radius; few points cannot claim that for themselves
-    form = max(0.85 * noise, 0.01 * radius) if count >= 200 and payoff >= 0.4 else 0.3 * noise
-    consistent, near = agreement
-    share = consistent / near if near else 1.0
-    error = math.sqrt(max(share * (1.0 - share), 0.05) / near) if near else 1.0
-    limits = config.model_dump()
-
-    def above(limit: str, value: float) -> bool:
-        return limits[limit] is not None and value > limits[limit]
-
-    failed = {
-        "too few points": count < config.min_inliers * (0.5 if payoff >= 0.5 else 1.0),
+def _refusal(measures: dict[str, float], count: int, coverage: float, config: VerificationConfig) -> str:
+    """Give the name of a limit the user has set that is not kept, or nothing."""
+    limits = {
+        "too few points": count < config.min_inliers,
         "coverage": coverage < math.radians(config.min_coverage_deg),
         "height": measures["height_radii"] < config.min_height,
-        "noise": config.max_noise_ratio is not None
-        and (measures["noise_ratio"] * noise) ** 2 > (config.max_noise_ratio * noise) ** 2 + form**2,
-        "lack of fit": above("max_lack_of_fit", measures["lack_of_fit"]) and measures["structure"] * noise > form,
-        "inside": above("max_inside", measures["inside"]),
-        "outside": above("max_outside", measures["outside"]),
-        "tangent": above("max_tangent", measures["tangent"]),
-        "curvature": config.min_curvature is not None and measures["curvature"] < config.min_curvature,
-        "slope": config.max_slope is not None
-        and abs(measures["slope"]) > config.max_slope + 3.0 * shape["slope_error"],
-        "bulge": config.max_bulge is not None
-        and (abs(measures["bulge"]) > config.max_bulge + 3.0 * shape["bulge_error"] or shape["bulge_error"] > 0.3),
-        "agreement": config.min_agreement is not None and share + error < config.min_agreement,
-        "payoff": payoff < 0.4 and count >= 300,
+        "slope": abs(measures["slope"]) > config.max_slope + 3.0 * measures["slope_error"],
+        "bulge": abs(measures["bulge"]) > config.max_bulge + 3.0 * measures["bulge_error"],
     }
-    return tuple(name for name, bad in failed.items() if bad)
+    return next((name for name, broken in limits.items() if broken), "")
 
 
 def covered_angle(angles: FloatArray) -> tuple[float, MaskArray]:
@@ -216,7 +199,7 @@ def _sector(angles: FloatArray) -> NDArray[np.int64]:
 
 
 def _shape(shell: Shell, segment: Segment, deviation: float) -> dict[str, float]:
-    """Measure what the residuals say of the shape: curvature against a plane, slope and bulge along the axis, with errors."""
+    """Measure curvature against a plane, slope and bulge along the axis, and their standard errors."""
     radius, half = float(segment.model[6]), segment.half
     z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
     cosine, sine = np.cos(angles), np.sin(angles)
