@@ -117,7 +117,7 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
     ),
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of everything random.  [default: 0]"),
     click.option("--radius", type=RadiusRange(), help="Smallest and largest radius, in the unit of the scan."),
-    click.option("--max-cylinders", type=click.IntRange(min=1), metavar="N", help="Stop after so many cylinders."),
+    click.option("--max-cylinders", type=click.IntRange(min=1), metavar="N", help="Give at most so many cylinders."),
     click.option("--planes", type=click.IntRange(min=0), metavar="N", help="Number of planes through the whole cloud."),
 )
 

@@ -112,9 +112,11 @@ def single(
 @click.option("--spheres", type=int, default=2, show_default=True, help="Number of spheres.")
 @click.option("--cones", type=int, default=1, show_default=True, help="Number of cones.")
 @click.option("--noise", type=float, default=0.05, show_default=True, help="Share of points anywhere in the room.")
-@click.option("--sigma", type=float, default=0.002, show_default=True, help="Noise of the other points.")
+@click.option("--sigma", type=float, default=0.002, show_default=True, help="Noise of points on surfaces.")
 @click.option("--radius", type=RadiusRange(), default="0.04:0.16", show_default=True, help="Radii of the cylinders.")
-@click.option("--coverage", "coverage_min_deg", type=float, default=150.0, show_default=True, help="Least angle seen.")
+@click.option(
+    "--coverage", "coverage_min_deg", type=float, default=150.0, show_default=True, help="Least angle seen, degrees."
+)
 @click.option("--room", type=float, help="Width of the room.  [default: as wide as the objects need]")
 @output_options
 def multi(
@@ -129,7 +131,7 @@ def multi(
 ) -> None:
     """Make a room with cylinders, and with planes, boxes, spheres, cones and noise.
 
-    OUT ends in .ply, .pcd or .xyz.
+    OUT ends in .ply, .pcd or .xyz. The unit is the metre, say; --scale 1000 turns it into millimetres.
     """
     from cylx import synthetic
 
