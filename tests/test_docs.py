@@ -14,6 +14,7 @@ from cylx.config import Config
 from cylx.io import annotated
 from cylx.records import Scene
 from cylx.scene import resolve
+from cylx.stages import verification
 
 ROOT = PACKAGE.parent
 DOCS = ROOT / "docs"
@@ -172,6 +173,7 @@ def test_every_measure_of_the_evidence_is_told_of():
     for golden in (ROOT / "sample_data" / "golden").glob("*.json"):
         for cylinder in json.loads(golden.read_text(encoding="utf-8"))["cylinders"]:
             assert set(cylinder.get("evidence", ())) <= set(told)
+    assert [key for key in told if f'"{key}":' not in inspect.getsource(verification)] == []
 
 
 def test_every_key_of_a_truth_is_told_of():
