@@ -1,0 +1,133 @@
+"""Pieces of one pipe become one cylinder, and neighbours stay two."""
+
+import numpy as np
+import pytest
+
+from cylx.config import Config
+from cylx.geometry.cells import Cells
+from cylx.geometry.cylinder import Cylinder
+from cylx.records import Finding, Ground, Segment
+from cylx.scene import make_frame
+from cylx.stages.merging import drop_claimed, merge_pieces
+from cylx.synthetic.surfaces import Mantle
+
+SIGMA = 0.01
+
+
+def world(*shapes, n=1500):
+    """Give the ground of some cylinders, and a finding for each."""
+    rng = np.random.default_rng(0)
+    clean = [Mantle(shape, 0.0, 2 * np.pi).sample(rng, n) for shape in shapes]
+    points = np.concatenate(clean) + SIGMA * rng.standard_normal((n * len(shapes), 3))
+    frame, _ = make_frame(points, Config())
+    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(points)), SIGMA / frame.spacing)
+    owner = np.repeat(np.arange(len(shapes)), n)[frame.order]
+    findings = [finding(shape, np.flatnonzero(owner == k), frame) for k, shape in enumerate(shapes)]
+    return ground, findings, frame
+
+
+def finding(shape, points, frame, payoff=0.8, error=0.001):
+    middle = (shape.point - frame.origin) / frame.spacing
+    model = np.concatenate([middle, shape.direction, [shape.radius / frame.spacing]])
+    half = 0.5 * shape.height / frame.spacing
+    return Finding(
+        segment=Segment(model, half, SIGMA / frame.spacing),
+        points=points,
+        support=10,
+        payoff=payoff,
+        confidence=0.9,
+        coverage=2 * np.pi,
+        offset_error=error * model[6],
+        tilt_error=error * model[6] / half,
+    )
+
+
+def accept(ground):
+    """Give a judge that believes everything, and takes all points near the surface."""
+
+    def judge(segment, best):
+        model = segment.model
+        width = 3.0 * ground.noise
+        near = ground.cells.near_cylinder(model, -segment.half, segment.half, model[6] - width, model[6] + width)
+        return Finding(segment, near, best.support, best.payoff, 0.9, 2 * np.pi, 0.01, 0.01)
+
+    return judge
+
+
+def pipe(low, high, x=0.0, radius=1.0, direction=(0, 0, 1)):
+    return Cylinder((x, 0, 0.5 * (low + high)), direction, radius, high - low)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.5, 3.0])
+def test_two_pieces_of_a_pipe_become_one(gap):
+    ground, findings, frame = world(pipe(0, 4), pipe(4 + gap, 8 + gap))
+    (whole,) = merge_pieces(findings, ground, accept(ground))
+    assert np.isclose(2 * whole.segment.half * frame.spacing, 8 + gap, rtol=0.01)
+    assert np.isclose(whole.segment.model[6] * frame.spacing, 1.0, rtol=0.005)
+    assert np.allclose(np.cross(whole.segment.model[3:6], [0, 0, 1]), 0, atol=0.005)
+    assert len(whole.points) > 2900
+
+
+def test_three_pieces_become_one_in_any_order():
+    ground, findings, _ = world(pipe(0, 3), pipe(3, 6), pipe(6, 9))
+    for order in ([0, 1, 2], [0, 2, 1], [2, 0, 1]):
+        assert len(merge_pieces([findings[k] for k in order], ground, accept(ground))) == 1
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        pipe(0, 4, x=2.1),
+        pipe(5, 9, x=0.5),
+        pipe(5, 9, radius=0.7),
+        pipe(5, 9, direction=(0.2, 0, 1)),
+    ],
+    ids=["beside", "displaced", "thinner", "bent"],
+)
+def test_neighbours_stay_two(other):
+    ground, findings, _ = world(pipe(0, 4), other)
+    kept = merge_pieces(findings, ground, accept(ground))
+    assert sorted(map(id, kept)) == sorted(map(id, findings))
+
+
+def test_pieces_too_far_to_tell_stay_two():
+    ground, (one, other), frame = world(pipe(0, 2), pipe(30, 32))
+    vague = [
+        finding(shape, part.points, frame, error=0.1) for shape, part in ((pipe(0, 2), one), (pipe(30, 32), other))
+    ]
+    assert len(merge_pieces(vague, ground, accept(ground))) == 2
+    assert len(merge_pieces([one, other], ground, accept(ground))) == 1
+
+
+def test_the_judge_has_the_last_word():
+    ground, findings, _ = world(pipe(0, 4), pipe(4, 8))
+    assert len(merge_pieces(findings, ground, lambda segment, best: None)) == 2
+
+
+def test_nothing_and_one_are_not_merged():
+    ground, findings, _ = world(pipe(0, 4))
+    assert merge_pieces([], ground, accept(ground)) == []
+    assert merge_pieces(findings, ground, accept(ground)) == findings
+
+
+def claims(*parts):
+    """Give findings with these points and payoffs."""
+    segment = Segment(np.array([0.0, 0, 0, 0, 0, 1, 1]), 1.0, 0.1)
+    return [Finding(segment, np.arange(*span), 5, payoff, 0.9, 6.0, 0.1, 0.1) for span, payoff in parts]
+
+
+@pytest.mark.parametrize(
+    ("parts", "kept"),
+    [
+        ([((0, 100), 0.9), ((100, 150), 0.9)], [0, 1]),
+        ([((0, 100), 0.9), ((60, 110), 0.9)], [0]),
+        ([((0, 100), 0.9), ((75, 125), 0.9)], [0, 1]),
+        ([((0, 100), 0.3), ((0, 90), 0.9)], [1]),
+        ([((0, 100), 0.9), ((40, 140), 0.8), ((110, 200), 0.9)], [0, 2]),
+        ([], []),
+    ],
+    ids=["apart", "mostly claimed", "half claimed", "the better payoff", "a chain", "none"],
+)
+def test_what_better_ones_have_claimed_is_dropped(parts, kept):
+    findings = claims(*parts)
+    assert {id(one) for one in drop_claimed(findings, 200)} == {id(findings[k]) for k in kept}
