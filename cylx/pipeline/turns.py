@@ -10,7 +10,7 @@ from cylx.pipeline.journal import Journal
 from cylx.records import Candidates, Finding, Ground, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame, agreement
-from cylx.stages.merging import drop_claimed, merge_pieces
+from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
 
 
@@ -55,7 +55,13 @@ class Turns:
         while (cluster := self._game.next_cluster()) is not None:
             segment = average_cluster(self._players, cluster, self._config.averaging)
             fitted = self._fit(segment)
-            found = fitted if isinstance(fitted, str) else self._judge(fitted, len(cluster.members), cluster.payoff)
+            found: Finding | str
+            if isinstance(fitted, str):
+                found = fitted
+            elif any(is_part_of(fitted, finding.segment) for finding in findings):
+                found = "found before"
+            else:
+                found = self._judge(fitted, len(cluster.members), cluster.payoff)
             if isinstance(found, Finding):
                 findings.append(found)
                 self._game.withdraw(self._game.explained_by(found.segment))
@@ -75,9 +81,11 @@ class Turns:
         kept = findings
         joined = claimed = 0
         if self._config.averaging.merge:
-            pieces = merge_pieces(findings, self._ground, self._join)
+            distinct = drop_claimed(findings, len(self._ground.points))
+            pieces = merge_pieces(distinct, self._ground, self._join)
             kept = drop_claimed(pieces, len(self._ground.points))
-            joined, claimed = len(findings) - len(pieces), len(pieces) - len(kept)
+            joined = len(distinct) - len(pieces)
+            claimed = len(findings) - joined - len(kept)
         if self._config.averaging.refine:
             kept = [self._finish(finding) for finding in kept]
         kept = sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))

@@ -27,7 +27,7 @@ CROWD = 400
 
 
 WITNESS = 0.4
-"""Windows below this many radii see dents and rims of real objects rather than the cylinder."""
+"""Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need smaller."""
 
 
 class CandidateGame:
@@ -108,7 +108,7 @@ class CandidateGame:
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
         """Give the candidates still in the game that a cylinder accounts for, or that say closely the same."""
-        near, distance = _near(self._candidates, segment)
+        near, distance = _near(self._candidates, segment, 1.0)
         limits = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
         return np.flatnonzero(self._alive & near & _agree(self._candidates, segment, distance, *limits))
 
@@ -156,18 +156,19 @@ def agreement(windows: Candidates, segment: Segment) -> tuple[int, int]:
     -------
     consistent, near : int
     """
-    near, distance = _near(windows, segment)
-    near &= (distance < segment.model[6]) & (windows.windows > WITNESS * segment.model[6])
+    near, distance = _near(windows, segment, 0.0)
+    seen = WITNESS * min(segment.model[6], 1.2 * segment.half)
+    near &= (distance < segment.model[6]) & (windows.windows > seen)
     consistent = near & _agree(windows, segment, distance, 0.15, 6.0, 0.1)
     return int(consistent.sum()), int(near.sum())
 
 
-def _near(candidates: Candidates, segment: Segment) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Tell which candidates lie along a cylinder's height and a radius more, and how far from its axis."""
+def _near(candidates: Candidates, segment: Segment, margin: float) -> tuple[NDArray[np.bool_], FloatArray]:
+    """Tell which candidates lie along a cylinder's height and some radii more, and how far from its axis."""
     offsets = candidates.points - segment.model[:3]
     heights = offsets @ segment.model[3:6]
     distance = np.linalg.norm(offsets - heights[:, None] * segment.model[3:6], axis=1)
-    return np.abs(heights) < segment.half + segment.model[6], distance
+    return np.abs(heights) < segment.half + margin * segment.model[6], distance
 
 
 def _agree(

@@ -14,9 +14,12 @@ from cylx.records import Finding, Ground, Segment
 FloatArray = NDArray[np.float64]
 
 COSINE = math.cos(math.radians(8.0))
+SAME_COSINE = math.cos(math.radians(4.0))
 RADIUS_RATIO = 0.75
 OFFSET = 0.3
 """Axes further apart than this, in radii, and four standard deviations are those of two pipes."""
+ENOUGH = 10000
+"""Points of each piece that suffice to see whether one cylinder explains both."""
 CLAIMED = 0.5
 """A cylinder that has more than this share of its points in common with better ones is one of them."""
 
@@ -54,6 +57,18 @@ def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[
                 j = i + 1
         i += 1
     return pool
+
+
+def is_part_of(segment: Segment, whole: Segment) -> bool:
+    """Tell whether a segment lies on one that is known: axis within a sixth of the radius, radius within a tenth."""
+    if abs(segment.model[3:6] @ whole.model[3:6]) < SAME_COSINE:
+        return False
+    if abs(segment.model[6] / whole.model[6] - 1.0) > 0.1:
+        return False
+    across = segment.model[:3] - whole.model[:3]
+    height = float(across @ whole.model[3:6])
+    apart = float(np.linalg.norm(across - height * whole.model[3:6]))
+    return apart < 0.15 * whole.model[6] and abs(height) + 0.5 * segment.half < whole.half + 0.5 * whole.model[6]
 
 
 def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
@@ -95,8 +110,8 @@ def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | Non
     model[:3] += 0.5 * (low + high) * model[3:6]
     half = 0.5 * (high - low)
     kernel = Kernel(max(0.1 * model[6], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-    union = np.union1d(a.points, b.points)
-    fit = fit_cylinder(ground.points[union], model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=30)
+    pieces = [ground.points[finding.points[:: 1 + len(finding.points) // ENOUGH]] for finding in (a, b)]
+    fit = fit_cylinder(np.concatenate(pieces), model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=30)
     if fit is None:
         return None
     model, spread = fit
@@ -104,8 +119,8 @@ def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | Non
     if spread > 1.1 * max(one.spread, two.spread, noise):
         return None
     width = 3.0 * max(min(spread, 2.0 * noise), noise)
-    for finding, share in ((a, 0.9), (b, 0.8)):
-        offsets = ground.points[finding.points] - model[:3]
+    for piece, share in zip(pieces, (0.9, 0.8), strict=True):
+        offsets = piece - model[:3]
         along = offsets @ model[3:6]
         distances = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))
         if (np.abs(distances - model[6]) < width).mean() < share:
