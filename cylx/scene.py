@@ -157,13 +157,14 @@ def resolve(config: Config, scene: Scene) -> Config:
     -------
     Config
     """
+    least, greatest = config.scene.radius_min, config.scene.radius_max
     thickness = config.slicing.thickness or 2.0 * max(scene.spacing, 2.0 * scene.noise)
     known = {
         "scene": {
             "spacing": scene.spacing,
             "noise": scene.noise,
-            "radius_min": config.scene.radius_min or max(3.0 * scene.noise, 0.25 * scene.spacing),
-            "radius_max": config.scene.radius_max or 0.5 * scene.extent,
+            "radius_min": least or min(max(3.0 * scene.noise, 0.25 * scene.spacing), greatest or math.inf),
+            "radius_max": greatest or max(0.5 * scene.extent, least or 0.0),
         },
         "slicing": {"thickness": thickness},
         "ellipses": {"tolerance": config.ellipses.tolerance or 4.0 * scene.noise + 0.06 * thickness},
