@@ -60,7 +60,7 @@ def test_a_room_full_of_things_shows_the_noise_of_its_surfaces(sigma):
 def test_outliers_hardly_change_the_noise(p, sigma_o):
     scene = measure_scene(single(points=4000, sigma=0.01, p=p, sigma_o=sigma_o).points)
     # all points together have a standard deviation of up to 0.11
-    assert 0.009 < scene.noise < 0.013
+    assert 0.009 < scene.noise < 0.015
 
 
 def test_a_surface_without_noise_has_a_scale_all_the_same():
