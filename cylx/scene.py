@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cylx.config import Config
 from cylx.errors import InputError
 from cylx.geometry.morton import BITS, cell_starts, gather_ball, morton_codes
-from cylx.records import Frame, Scene
+from cylx.records import Frame, Noise, Scene
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -26,6 +26,8 @@ NEIGHBOURS = (48, 96, 192)
 """Sizes of a neighbourhood: the next is taken where the patch is not wide against its thickness."""
 WIDE = 4.0
 """A patch is wide if its in-plane rms exceeds its thickness this many times."""
+PIECES, PATCH = 600, 64
+"""Larger pieces looked at, and the points of each."""
 MAD_SHRINKAGE = 0.93
 """What the median absolute deviation of 48 quadric residuals shows of a Gaussian's standard deviation, as a share."""
 
@@ -118,8 +120,10 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
         What was measured or given, scene units.
     """
     ordered, order, codes, unit = canonical_order(points)
-    spacing, dense, noise = _measure(ordered, codes, unit, np.random.default_rng([config.seed, 1]))
-    noise = config.scene.noise or noise
+    rng = np.random.default_rng([config.seed, 1])
+    spacing, dense, measured = _measure(ordered, codes, unit, rng)
+    noise = config.scene.noise or measured
+    sizes, deviations = _noise_by_size(ordered, codes, unit, spacing, measured, rng)
     dense *= (config.scene.spacing or spacing) / spacing
     spacing = config.scene.spacing or spacing
     scene = Scene(spacing, noise, float(np.linalg.norm(np.ptp(points, axis=0))))
@@ -138,7 +142,7 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
         unit=unit,
         voxel_level=level,
         window=window,
-        noise=noise / spacing,
+        noise=Noise(sizes / spacing, deviations * (noise / measured) / spacing),
         origin=points.min(axis=0),
         spacing=spacing,
     )
@@ -217,6 +221,65 @@ def _measure(
         # heavy outliers blow up the plain estimate alone
         noise = max(noise, robust / MAD_SHRINKAGE if robust < 0.85 * MAD_SHRINKAGE * plain else plain)
     return float(typical), float(dense), float(noise)
+
+
+def _noise_by_size(
+    points: FloatArray, codes: IndexArray, unit: float, spacing: float, noise: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Measure the noise over larger and larger flat pieces, as long as there are such and most of them agree.
+
+    The residuals of curved pieces show their shape as soon as they are large; those of flat ones show noise at any
+    size.
+    """
+    sizes, deviations = [4.0 * spacing], [noise]
+    while len(sizes) < 5:
+        size = 2.0 * sizes[-1]
+        level = min(BITS, max(0, math.floor(math.log2(size / unit))))
+        cells, starts = cell_starts(codes, level)
+        sample = np.sort(rng.choice(len(points), min(PIECES, len(points)), replace=False))
+        patches = np.empty((len(sample), PATCH, 3))
+        full = np.zeros(len(sample), np.bool_)
+        _fill_patches(points, cells, starts, unit * 2.0**level, sample, size, patches, full)
+        if full.mean() < 0.5:
+            break
+        sd, robust, width = _quadric_residuals(patches[full])
+        value = np.maximum(np.minimum(sd, robust / MAD_SHRINKAGE), 1e-12 * spacing)
+        covariance = np.einsum("mki,mkj->mij", *2 * (patches[full] - patches[full].mean(axis=1, keepdims=True),))
+        thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 0], 0.0) / PATCH)
+        flat = (value < width / 8.0) & (thickness < 2.0 * value)
+        if flat.sum() < max(20, 0.15 * len(flat)):
+            break
+        mode = half_sample_mode(value[flat])
+        if (np.abs(np.log(value[flat] / mode)) < 0.3).mean() < 0.4:
+            break
+        sizes.append(size)
+        deviations.append(min(max(mode, deviations[-1]), 2.0 * deviations[-1]))
+    # a tenth is the scatter of the estimate itself
+    grown = np.where(np.array(deviations) > 1.15 * noise, deviations, noise)
+    return np.array(sizes), np.maximum.accumulate(grown)
+
+
+@njit(cache=True, nogil=True)
+def _fill_patches(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    sample: IndexArray,
+    size: float,
+    patches: FloatArray,
+    full: NDArray[np.bool_],
+) -> None:
+    """Fill each patch with points evenly picked from the ball about a sample point, if it holds enough of them."""
+    found = np.empty(40000, np.int64)
+    count = patches.shape[1]
+    for s in range(len(sample)):
+        n = gather_ball(points, cells, starts, side, points[sample[s]], size, found)
+        full[s] = n >= count
+        if full[s]:
+            for a in range(count):
+                for d in range(3):
+                    patches[s, a, d] = points[found[(a * n) // count], d]
 
 
 def half_sample_mode(values: FloatArray) -> float:

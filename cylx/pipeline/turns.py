@@ -47,6 +47,8 @@ class Turns:
         self._ground = ground
         self._radii = radii
         self._config = config
+        # the paper takes no more than the winners out of the game (section 3.5)
+        self._removes = config.clustering.population == "local"
 
     def play(self, journal: Journal) -> list[Finding]:
         """Take cluster after cluster until none is left, or until as many cylinders as asked for are found."""
@@ -58,17 +60,18 @@ class Turns:
             found: Finding | str
             if isinstance(fitted, str):
                 found = fitted
-            elif any(is_part_of(fitted, finding.segment) for finding in findings):
+            elif self._removes and any(is_part_of(fitted, finding.segment) for finding in findings):
                 found = "found before"
             else:
                 found = self._judge(fitted, len(cluster.members), cluster.payoff)
             if isinstance(found, Finding):
                 findings.append(found)
-                self._game.withdraw(self._game.explained_by(found.segment))
             else:
                 rejected[found] += 1
-                if isinstance(fitted, Segment):  # its like would lead to the same fit again
-                    self._game.withdraw(self._game.explained_by(fitted, closely=True))
+            if self._removes and isinstance(fitted, Segment):
+                # what the like of a refused segment would lead to is known, too
+                closely = not isinstance(found, Finding)
+                self._game.withdraw(self._game.explained_by(fitted, closely=closely))
             journal.advance()
             if self._enough(findings):
                 break

@@ -4,7 +4,7 @@ Many things of one kind travel as a structure of arrays (`Candidates`); the few 
 one. All records are frozen: a stage makes new ones and never changes those it was given.
 """
 
-from cylx.records.clouds import Frame, Ground, PointCloud, Scene, Source
+from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source
 from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
 from cylx.records.outcomes import CylinderFit, Extraction, Finding, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
@@ -18,6 +18,7 @@ __all__ = [
     "Finding",
     "Frame",
     "Ground",
+    "Noise",
     "Observer",
     "PointCloud",
     "Scene",

@@ -132,6 +132,34 @@ class Scene:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Noise:
+    """How far points scatter about their surface, by the size of the surface looked at.
+
+    Neighbouring points of a stereo or depth camera err together, so the noise of a large piece exceeds that of a small
+    one.
+
+    Parameters
+    ----------
+    sizes : ndarray of shape (k,)
+        Radii of the pieces, ascending.
+    deviations : ndarray of shape (k,)
+        Standard deviations, ascending.
+    """
+
+    sizes: FloatArray
+    deviations: FloatArray
+
+    def at(self, size: float) -> float:
+        """Give the standard deviation over a piece of this radius; ends of the table hold beyond them."""
+        return float(np.exp(np.interp(np.log(max(size, 1e-300)), np.log(self.sizes), np.log(self.deviations))))
+
+    @property
+    def least(self) -> float:
+        """The standard deviation over the smallest pieces."""
+        return float(self.deviations[0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """A cloud in its own units and order: what all stages work on.
 
@@ -149,8 +177,8 @@ class Frame:
         Cells of this level are voxels: six of their sides make the radius of the smallest window.
     window : float
         Radius of the smallest window, in spacings.
-    noise : float
-        Standard deviation of points about their surface, in spacings.
+    noise : Noise
+        Scatter of points about their surface, in spacings.
     origin : ndarray of shape (3,)
         Where the frame's zero lies, scene units.
     spacing : float
@@ -163,7 +191,7 @@ class Frame:
     unit: float
     voxel_level: int
     window: float
-    noise: float
+    noise: Noise
     origin: FloatArray
     spacing: float
 
@@ -182,13 +210,13 @@ class Ground:
         All points of the frame.
     flatness : ndarray of shape (N,)
         Radius of the largest flat window that holds the point, 0 if there is none; frame units.
-    noise : float
+    noise : Noise
         Frame units.
     """
 
     cells: Cells
     flatness: FloatArray
-    noise: float
+    noise: Noise
 
     @property
     def points(self) -> FloatArray:

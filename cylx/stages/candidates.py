@@ -95,10 +95,11 @@ def polish_candidates(
         sample = thin(frame.codes, frame.voxel_level + int(level))
         cells, starts = cell_starts(frame.codes[sample], frame.voxel_level + int(level) + 3)
         side = frame.unit * 2.0 ** (frame.voxel_level + int(level) + 3)
+        noise = frame.noise.at(frame.window * 2.0 ** int(level))
         which = np.flatnonzero(octave == level)
         part, good = rows[which], np.zeros(len(which), np.bool_)
         _polish(
-            frame.points[sample], cells, starts, side, frame.noise, *radius_range, config.min_inliers, config.min_share,
+            frame.points[sample], cells, starts, side, noise, *radius_range, config.min_inliers, config.min_share,
             part, good
         )  # fmt: skip
         rows[which], kept[which] = part, good

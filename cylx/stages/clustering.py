@@ -27,7 +27,8 @@ CROWD = 400
 
 
 WITNESS = 0.4
-"""Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need smaller."""
+"""Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
+smaller."""
 
 
 class CandidateGame:

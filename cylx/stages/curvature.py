@@ -128,7 +128,7 @@ def _look(
             side,
             seeds[first:last],
             radius,
-            frame.noise,
+            frame.noise.at(2.0 * radius),
             radius_range[0],
             radius_range[1],
             config.min_inliers,
@@ -240,7 +240,7 @@ def _mark_flat(frame: Frame, seeds: FloatArray, planes: FloatArray, radius: floa
         seeds,
         planes,
         2.0 * radius,
-        3.0 * frame.noise,
+        3.0 * frame.noise.at(2.0 * radius),
         flatness,
     )
 

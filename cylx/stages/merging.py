@@ -68,7 +68,7 @@ def is_part_of(segment: Segment, whole: Segment) -> bool:
     across = segment.model[:3] - whole.model[:3]
     height = float(across @ whole.model[3:6])
     apart = float(np.linalg.norm(across - height * whole.model[3:6]))
-    return apart < 0.15 * whole.model[6] and abs(height) + 0.5 * segment.half < whole.half + 0.5 * whole.model[6]
+    return bool(apart < 0.15 * whole.model[6] and abs(height) + 0.5 * segment.half < whole.half + 0.5 * whole.model[6])
 
 
 def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
@@ -91,7 +91,8 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
 
 def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
     """Fit one cylinder to two pieces; None if it does not explain both."""
-    one, two, noise = a.segment, b.segment, ground.noise
+    one, two = a.segment, b.segment
+    noise = ground.noise.at(one.model[6])
     if abs(one.model[3:6] @ two.model[3:6]) < COSINE:
         return None
     if min(one.model[6], two.model[6]) < RADIUS_RATIO * max(one.model[6], two.model[6]):
