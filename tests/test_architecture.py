@@ -9,8 +9,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "cli", "config", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "payoff", "pipeline", "records",
-    "results",
+    "api", "cli", "config", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "noise", "payoff",
+    "pipeline", "records", "results",
     "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
@@ -20,8 +20,9 @@ MAY_IMPORT = {
     "api": {"config", "errors", "io", "pipeline", "records"},
     "pipeline": {"config", "errors", "game", "geometry", "records", "scene", "stages"},
     "stages": {"config", "errors", "evidence", "game", "geometry", "payoff", "records"},
+    "noise": {"geometry"},
     "payoff": {"game", "geometry"},
-    "scene": {"config", "errors", "geometry", "records"},
+    "scene": {"config", "errors", "geometry", "noise", "records"},
     "results": {"config", "cylx", "errors", "geometry", "records"},
     "io": {"errors", "geometry", "records"},
     "records": {"config", "geometry"},

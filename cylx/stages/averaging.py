@@ -92,7 +92,7 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
             return "too few points"
         stride = max(1, len(points) // ENOUGH)
         kernel = Kernel(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-        fit = fit_cylinder(points[::stride], model, low=-half, high=half, kernel=kernel, steps=12 if step else 25)
+        fit = fit_cylinder(points[::stride], model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=12 if step else 25)
         if fit is None:
             return "no fit"
         model, spread = fit
@@ -136,7 +136,7 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     points = points[:: max(1, len(points) // most)] if most else points
     kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
     fit = (
-        fit_cylinder(points, segment.model, low=-half, high=half, kernel=kernel, steps=60) if len(points) > 19 else None
+        fit_cylinder(points, segment.model, low=-1.02*half, high=1.02*half, kernel=kernel, steps=60) if len(points) > 19 else None
     )
     if fit is None:
         return "no fit"
