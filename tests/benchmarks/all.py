@@ -24,7 +24,7 @@ BENCHMARKS = {
     "single-auto": "single.py --preset auto --max-angle 0.05 --max-offset 0.002 --max-radius 0.1",
     "single-arc": "single.py --preset auto --theta 135 --sigma 0.005 --sigma-o 0.01 --p 0.1 --max-angle 0.05",
     "cans": "scenes.py scenes/five?.ply scenes/pair?.ply --min-f1 1",
-    "pair": "pair.py scenes/pair?.ply --max-angle 0.1",
+    "pair": "pair.py scenes/pair?.ply scenes/half?.ply --max-angle 0.1",
     "mug": "mug.py --max-angle 1.5 --max-radius 1",
     "clutter": "scenes.py scenes/table?.ply scenes/view?.ply scenes/clutter?.ply",
     "rack": "scenes.py scenes/rack?.ply",

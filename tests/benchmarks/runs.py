@@ -57,7 +57,8 @@ def extract(scan, folder, *, times=1, extra=()):
 
 def warm_up(folder):
     """Extract a sample, so that what is measured next finds everything compiled."""
-    extract(SAMPLE, folder)
+    if extract(SAMPLE, folder)[1] is None:
+        give_up("cylx cannot extract its own sample")
 
 
 def give_up(message):

@@ -15,6 +15,7 @@ YCB, SYNTHETIC = "ycb_scenes.py", "scenes.py"
 SEEDS = range(3)
 SCENES = {
     **{f"{name}{seed}": (YCB, name, seed, ()) for name in ("five", "pair", "table", "view") for seed in SEEDS},
+    **{f"half{seed}": (YCB, "pair", seed, ("--fraction", "0.5")) for seed in SEEDS},
     **{f"clutter{seed}": (SYNTHETIC, "clutter", seed, ("--points", "300000")) for seed in SEEDS},
     "rack0": (SYNTHETIC, "rack", 0, ("--points", "1000000")),
 }

@@ -20,6 +20,8 @@ def number(value, digits=3):
         return "-"
     if isinstance(value, int) or value == 0 or not math.isfinite(value):
         return f"{value:.0f}" if math.isfinite(value) else str(value)
+    if abs(value) < 1e-5:
+        return "< 0.00001"
     decimals = digits - 1 - math.floor(math.log10(abs(value)))
     return f"{value:.{max(decimals, 0)}f}"
 
