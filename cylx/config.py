@@ -119,7 +119,7 @@ class ClusteringConfig(Section):
     max_iterations: Annotated[int, Field(ge=1)] = 300
     """Most steps of the dynamics a cluster."""
     tolerance: Positive = 1e-4
-    """The dynamics stop when the population changes by less than this a step."""
+    """The dynamics stop when a step changes the shares by less than this, or when nobody could gain more than this."""
     min_support: Annotated[int, Field(ge=1)] = 3
     """A cluster with fewer candidates is dropped."""
     min_payoff: Share = 0.3

@@ -10,10 +10,10 @@ from cylx.config import Config, load_config
 from cylx.errors import InputError
 from cylx.geometry.cylinder import Cylinder
 from cylx.geometry.morton import morton_codes
+from cylx.noise import half_sample_mode
 from cylx.scene import (
     canonical_order,
     check_usable,
-    half_sample_mode,
     make_frame,
     measure_scene,
     radius_range,
@@ -187,14 +187,14 @@ def framed():
 def test_the_frame_is_the_cloud_in_its_own_units(framed):
     points, frame, scene = framed
     assert frame.spacing == scene.spacing
-    assert np.isclose(frame.noise, scene.noise / scene.spacing)
+    assert np.isclose(frame.noise.least, scene.noise / scene.spacing)
     assert np.array_equal(np.sort(frame.order), np.arange(4000))
     assert np.allclose(frame.points * frame.spacing + frame.origin, points[frame.order], rtol=0, atol=1e-12)
     assert np.array_equal(frame.codes, morton_codes(frame.points, frame.unit))
     assert (np.diff(frame.codes) >= 0).all()
     # six voxels to the smallest window, which is at least as wide as promised
     assert np.isclose(frame.unit * 2**frame.voxel_level, frame.window / 6)
-    assert frame.window >= Config().candidates.window_noises * frame.noise * (1 - 1e-12)
+    assert frame.window >= Config().candidates.window_noises * frame.noise.least * (1 - 1e-12)
     shape = Cylinder((1, 2, 3), (0, 0, 1), 2.0, 4.0)
     assert np.allclose(frame.to_scene(shape).point, frame.spacing * shape.point + frame.origin)
     assert np.isclose(frame.to_scene(shape).radius, 2 * frame.spacing)
@@ -205,7 +205,7 @@ def test_what_is_known_of_the_scene_is_not_measured(framed):
     config = load_config(overrides=["scene.noise=0.0123", "scene.spacing=0.5"])
     frame, scene = make_frame(points, config)
     assert (scene.noise, scene.spacing, frame.spacing) == (0.0123, 0.5, 0.5)
-    assert np.isclose(frame.noise, 0.0246)
+    assert np.isclose(frame.noise.least, 0.0246)
     assert scene.extent == measured.extent
 
 

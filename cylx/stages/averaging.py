@@ -26,6 +26,8 @@ ENOUGH = 6000
 """Points that suffice while a cylinder grows."""
 MANY = 20000
 """Points that suffice to judge it; the last fit takes all."""
+BEYOND = 1.02
+"""A fit goes this much further than the ends: the outermost points lie on them, and rounding would decide about those."""
 LEAST_COSINE = math.cos(math.radians(25.0))
 """A fit whose axis turns further than this has left the candidates it came from."""
 ARC_BINS = 24
@@ -92,7 +94,8 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
             return "too few points"
         stride = max(1, len(points) // ENOUGH)
         kernel = Kernel(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-        fit = fit_cylinder(points[::stride], model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=12 if step else 25)
+        end = BEYOND * half
+        fit = fit_cylinder(points[::stride], model, low=-end, high=end, kernel=kernel, steps=12 if step else 25)
         if fit is None:
             return "no fit"
         model, spread = fit
@@ -132,12 +135,11 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     """
     noise, half = ground.noise.at(segment.model[6]), segment.half
     width = max(4.0 * noise, 0.02 * segment.model[6])
-    points = _own_points(ground, segment.model, 1.02 * half, 2.0 * width)
+    end = BEYOND * half
+    points = _own_points(ground, segment.model, end, 2.0 * width)
     points = points[:: max(1, len(points) // most)] if most else points
     kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-    fit = (
-        fit_cylinder(points, segment.model, low=-1.02*half, high=1.02*half, kernel=kernel, steps=60) if len(points) > 19 else None
-    )
+    fit = fit_cylinder(points, segment.model, low=-end, high=end, kernel=kernel, steps=60) if len(points) > 19 else None
     if fit is None:
         return "no fit"
     model, spread = fit
