@@ -27,7 +27,7 @@ ENOUGH = 6000
 MANY = 20000
 """Points that suffice to judge it; the last fit takes all."""
 BEYOND = 1.02
-"""A fit goes this much further than the ends: the outermost points lie on them, and rounding would decide about those."""
+"""A fit goes this much further than the ends: the outermost points lie on them, and rounding would choose."""
 LEAST_COSINE = math.cos(math.radians(25.0))
 """A fit whose axis turns further than this has left the candidates it came from."""
 ARC_BINS = 24
