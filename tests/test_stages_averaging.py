@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cylx.config import AveragingConfig, Config
 from cylx.geometry.cells import Cells
-from cylx.records import Candidates, Cluster, Ground, Segment
+from cylx.records import Candidates, Cluster, Ground, Noise, Segment
 from cylx.scene import make_frame
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit, visible_extent
 from cylx.synthetic import single
@@ -106,7 +106,8 @@ def test_close_candidates_are_averaged_like_vectors(spread):
 
 def ground_of(points, noise):
     frame, _ = make_frame(points, Config())
-    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), noise / frame.spacing)
+    known = Noise(np.ones(1), np.array([noise / frame.spacing]))
+    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), known)
     return ground, frame
 
 
@@ -143,7 +144,7 @@ def test_a_rough_piece_grows_into_the_whole_cylinder(scan, seed):
     # an outlier beyond an end, in the last piece of a quarter of the radius that is filled, is taken for the end
     ends = (found.model[2] - truth[2] + np.array([-1, 1]) * found.half) / truth[6]
     assert np.allclose(ends, [-3, 3], atol=0.25)
-    assert np.isclose(found.spread, ground.noise, rtol=0.1)
+    assert np.isclose(found.spread, ground.noise.least, rtol=0.1)
 
 
 def test_different_starts_end_in_the_same_fit(scan):
@@ -182,7 +183,7 @@ def test_the_extent_of_the_paper_keeps_axis_and_radius(scan):
     assert np.array_equal(found.model[3:], truth[3:])
     assert np.allclose(np.cross(found.model[:3] - truth[:3], truth[3:6]), 0, atol=1e-9)
     assert np.isclose(found.half, 3 * truth[6], rtol=0.05)
-    assert np.isclose(found.spread, ground.noise, rtol=0.2)
+    assert np.isclose(found.spread, ground.noise.least, rtol=0.2)
 
 
 def surface(rng, low, high, n, arc=2 * np.pi):

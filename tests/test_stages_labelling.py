@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder, cylinder_coordinates, surface_distances
 from cylx.geometry.morton import BITS, morton_codes
-from cylx.records import Ground, Segment
+from cylx.records import Ground, Noise, Segment
 from cylx.stages.labelling import label_points
 
 NOISE = 0.02
@@ -20,7 +20,9 @@ def ground_of(points, flatness=None):
     codes = morton_codes(points, points.max() / (2**BITS - 2))
     order = np.argsort(codes)
     flat = np.zeros(len(points)) if flatness is None else flatness[order]
-    return Ground(Cells(np.ascontiguousarray(points[order]), codes[order]), flat, NOISE), order
+    return Ground(
+        Cells(np.ascontiguousarray(points[order]), codes[order]), flat, Noise(np.ones(1), np.array([NOISE]))
+    ), order
 
 
 def segment(point, direction, radius, half, spread=NOISE):

@@ -6,7 +6,7 @@ import pytest
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
-from cylx.records import Finding, Ground, Segment
+from cylx.records import Finding, Ground, Noise, Segment
 from cylx.scene import make_frame
 from cylx.stages.merging import drop_claimed, merge_pieces
 from cylx.synthetic.surfaces import Mantle
@@ -20,7 +20,8 @@ def world(*shapes, n=1500):
     clean = [Mantle(shape, 0.0, 2 * np.pi).sample(rng, n) for shape in shapes]
     points = np.concatenate(clean) + SIGMA * rng.standard_normal((n * len(shapes), 3))
     frame, _ = make_frame(points, Config())
-    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(points)), SIGMA / frame.spacing)
+    noise = Noise(np.ones(1), np.array([SIGMA / frame.spacing]))
+    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
     owner = np.repeat(np.arange(len(shapes)), n)[frame.order]
     findings = [finding(shape, np.flatnonzero(owner == k), frame) for k, shape in enumerate(shapes)]
     return ground, findings, frame
@@ -47,7 +48,7 @@ def accept(ground):
 
     def judge(segment, best):
         model = segment.model
-        width = 3.0 * ground.noise
+        width = 3.0 * ground.noise.least
         near = ground.cells.near_cylinder(model, -segment.half, segment.half, model[6] - width, model[6] + width)
         return Finding(segment, near, best.support, best.payoff, 0.9, 2 * np.pi, 0.01, 0.01)
 
