@@ -11,6 +11,7 @@ from cylx.errors import InputError
 from cylx.geometry.cylinder import Cylinder
 from cylx.geometry.morton import morton_codes
 from cylx.noise import half_sample_mode
+from cylx.records import Noise
 from cylx.scene import (
     canonical_order,
     check_usable,
@@ -258,3 +259,30 @@ def test_the_mode_is_where_most_values_are():
     assert np.isclose(half_sample_mode(rng.permutation(values)), half_sample_mode(values), rtol=1e-12)
     assert np.isclose(half_sample_mode(np.array([3.0])), 3.0)
     assert np.isclose(half_sample_mode(np.full(7, 3.0)), 3.0)
+
+
+def test_independent_noise_is_the_same_at_every_size():
+    for points in (plane(6000, 0.003), single(points=4000).points):
+        noise = make_frame(points, Config())[0].noise
+        assert len(set(noise.deviations)) == 1
+        assert noise.at(1e-6) == noise.at(1e6) == pytest.approx(noise.least)
+
+
+def test_noise_that_neighbours_share_grows_with_the_size():
+    rng = np.random.default_rng(3)
+    points = plane(8000, 0.002)
+    for _ in range(60):  # waves of about twenty spacings, 0.005 in all
+        pitch = 2 * np.pi / 0.2 * rng.uniform(0.7, 1.4)
+        turn = rng.uniform(0, 2 * np.pi)
+        points[:, 2] += 0.005 / np.sqrt(30) * np.cos(pitch * points[:, :2] @ [np.cos(turn), np.sin(turn)] + 7 * turn)
+    frame, scene = make_frame(points, Config())
+    assert np.isclose(frame.noise.least * frame.spacing, scene.noise)
+    assert 0.0018 < scene.noise < 0.003
+    assert 0.004 < frame.noise.at(60.0) * frame.spacing < 0.007
+    assert (np.diff(frame.noise.deviations) >= 0).all()
+
+
+def test_noise_between_two_sizes_is_between_theirs():
+    noise = Noise(np.array([1.0, 4.0]), np.array([0.1, 0.4]))
+    assert [noise.at(size) for size in (0.0, 0.5, 1, 2, 4, 9)] == pytest.approx([0.1, 0.1, 0.1, 0.2, 0.4, 0.4])
+    assert noise.least == 0.1
