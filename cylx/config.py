@@ -144,7 +144,7 @@ class VerificationConfig(Section):
     """Verify at all; the paper does not."""
     min_confidence: Share = 0.5
     """Least confidence. Raising it gives fewer false cylinders and more missed ones."""
-    min_inliers: Annotated[int, Field(ge=0)] = 30
+    min_inliers: Annotated[int, Field(ge=0)] = 40
     """Fewest points of a cylinder."""
     min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 20.0
     """Smallest angle about the axis that must be covered, degrees."""

@@ -35,34 +35,45 @@ class Term(NamedTuple):
     value: Callable[[Mapping[str, float]], float]
 
 
+FORM = 0.012
+"""Real objects deviate from a cylinder by about this share of their radius: cans have seams, pipes are out of round."""
+FORM_NOISES = 1.2
+"""No deviation of form beyond this many noises is excused: that of a large radius could hide anything."""
+
+
 def _log(value: float, low: float, high: float) -> float:
     return math.log(min(max(value, low), high))
 
 
-def _beyond(value: float, error: float, most: float) -> float:
-    """Give how far a value is from zero beyond two standard errors, at most `most`."""
-    return min(max(0.0, abs(value) - 2.0 * error), most)
+def _thickness(measures: Mapping[str, float]) -> float:
+    """Give the thickness of the surface in noises, without the form error that real objects are excused."""
+    structure, share = measures["structure"], measures["structure_radii"]
+    excused = min(structure, FORM_NOISES, FORM * structure / share) if share > 0.0 else 0.0
+    return math.sqrt(max(measures["noise_ratio"] ** 2 - excused**2, 1.0))
 
 
-BIAS = -10.605
+def _slope(measures: Mapping[str, float]) -> float:
+    """Give the slope beyond two standard errors, at most 0.3."""
+    return min(max(0.0, abs(measures["slope"]) - 2.0 * measures["slope_error"]), 0.3)
+
+
+BIAS = -8.918
 TERMS = (
-    # thickness of the surface against the noise of the scene, and what of it is form error, in hundredths of the radius
-    Term("noise", -5.769, 0.09, lambda m: _log(m["noise_ratio"], 1.0, 20.0)),
-    Term("lack of fit", -0.538, 0.6, lambda m: 100.0 * min(m["structure_radii"], 0.1)),
-    # other points just outside the surface
-    Term("outside", -0.756, 0.2, lambda m: _log(m["outside"] + 0.05, 0.05, 20.0) - math.log(0.05)),
+    Term("noise", -7.070, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    # other points inside, just outside, and going on past both ends of the arc
+    Term("inside", -0.400, 0.06, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -1.115, 0.16, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
+    Term("tangent", -0.901, 0.01, lambda m: min(m["tangent"], 1.5)),
     # how much of a cylinder is there at all
-    Term("coverage", 1.282, 0.85, lambda m: min(m["coverage"], math.pi) / math.pi),
-    Term("too few points", 1.037, 2.1, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
-    Term("height", 1.240, 1.3, lambda m: _log(m["height_radii"], 0.1, 4.0)),
-    Term("curvature", 0.269, 2.9, lambda m: _log(m["curvature"] / 10.0, 0.01, 100.0)),
+    Term("coverage", 0.523, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
+    Term("too few points", 0.686, 2.56, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
+    Term("height", 1.296, 1.31, lambda m: _log(m["height_radii"], 0.1, 4.0)),
     # what the candidates say
-    Term("payoff", 1.286, 0.65, lambda m: m["payoff"]),
-    Term("agreement", 10.833, 0.88, lambda m: m["agreement"]),
-    # cones, spheres, elbows
-    Term("slope", -24.58, 0.0, lambda m: _beyond(m["slope"], m["slope_error"], 0.3)),
-    Term("bulge", -12.102, 0.0, lambda m: _beyond(m["bulge"], m["bulge_error"], 1.0)),
-    Term("bulge unknown", -4.135, 0.01, lambda m: min(m["bulge_error"], 1.0)),
+    Term("payoff", 3.193, 0.75, lambda m: m["payoff"]),
+    Term("agreement", 8.954, 0.88, lambda m: m["agreement"]),
+    # cones; and whatever is too short to be told from a sphere
+    Term("slope", -21.66, 0.0, _slope),
+    Term("bulge unknown", -26.708, 0.0, lambda m: min(m["bulge_error"], 1.0)),
 )
 
 
@@ -83,9 +94,9 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
 
     Examples
     --------
-    >>> pipe = dict(noise_ratio=1.0, structure_radii=0.0, outside=0.0, coverage=6.0, inliers=2000.0, height_radii=9.0,
-    ...             curvature=900.0, payoff=0.8, agreement=0.95, slope=0.0, slope_error=0.001, bulge=0.0,
-    ...             bulge_error=0.01)
+    >>> pipe = dict(noise_ratio=1.0, structure=0.0, structure_radii=0.0, inside=0.0, outside=0.0, tangent=0.0,
+    ...             coverage=6.0, inliers=2000.0, height_radii=9.0, payoff=0.8, agreement=0.95, slope=0.0,
+    ...             slope_error=0.001, bulge_error=0.01)
     >>> weigh(pipe)[0] > 0.99
     True
     >>> confidence, worst = weigh({**pipe, "agreement": 0.1, "payoff": 0.3})

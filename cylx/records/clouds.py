@@ -223,6 +223,10 @@ class Ground:
         """The points, shape (N, 3)."""
         return self.cells.points
 
+    def noise_about(self, radius: float) -> float:
+        """Give the noise over the surface of a cylinder of this radius, a piece as large as its diameter."""
+        return self.noise.at(2.0 * radius)
+
     def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
         """Tell which points may lie on a cylinder: those in flat windows of two radii belong to something flatter."""
         return np.asarray(self.flatness[indices] < 2.0 * radius, dtype=np.bool_)

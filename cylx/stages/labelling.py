@@ -32,7 +32,7 @@ def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.in
     nearest = np.full(len(ground.points), np.inf)
     for index, segment in enumerate(segments):
         radius = segment.model[6]
-        reach = 3.0 * max(segment.spread, ground.noise.at(radius))
+        reach = 3.0 * max(segment.spread, ground.noise_about(radius))
         near = ground.cells.near_cylinder(
             segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
         )
