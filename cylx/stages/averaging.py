@@ -89,7 +89,7 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         beyond = max(1.5 * model[6], 0.7 * half) if step else 0.5 * model[6]
         shell = max(0.12 * model[6] if step == 0 else 0.05 * model[6], 5.0 * noise)
         width = shell + 8.0 * noise
-        points = _own_points(ground, model, half + beyond, width)
+        points = _own_points(ground, model, half + beyond, width, MANY)
         if len(points) < 20:
             return "too few points"
         stride = max(1, len(points) // ENOUGH)
@@ -136,8 +136,7 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     noise, half = ground.noise_about(segment.model[6]), segment.half
     width = max(4.0 * noise, 0.02 * segment.model[6])
     end = BEYOND * half
-    points = _own_points(ground, segment.model, end, 2.0 * width)
-    points = points[:: max(1, len(points) // most)] if most else points
+    points = _own_points(ground, segment.model, end, 2.0 * width, most)
     kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
     fit = fit_cylinder(points, segment.model, low=-end, high=end, kernel=kernel, steps=60) if len(points) > 19 else None
     if fit is None:
@@ -185,9 +184,10 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
     return Segment(moved, 0.5 * (high - low), spread)
 
 
-def _own_points(ground: Ground, model: FloatArray, half: float, width: float) -> FloatArray:
-    """Give the points near a cylinder's surface that do not belong to something much flatter."""
+def _own_points(ground: Ground, model: FloatArray, half: float, width: float, most: int | None) -> FloatArray:
+    """Give the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
     near = ground.cells.near_cylinder(model, -half, half, max(0.0, model[6] - width), model[6] + width)
+    near = near[:: max(1, len(near) // most)] if most else near
     return ground.points[near[ground.may_be_on(near, model[6])]]
 
 
