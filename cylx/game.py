@@ -15,7 +15,9 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 EXTINCT = 1e-9
-"""A share of the population below this is taken for zero: replicators get there only in infinite time."""
+"""A share of the final population below this is taken for zero: replicators get there only in infinite time."""
+GONE = 1e-200
+"""A share below this cannot come back before the dynamics end."""
 
 
 @njit(cache=True, nogil=True)
@@ -35,7 +37,7 @@ def _replicator(payoff: FloatArray, population: FloatArray, steps: int, toleranc
         change = 0.0
         for i in range(n):
             share = population[i] * fitness[i] / mean  # eq. 7
-            if share < EXTINCT:
+            if share < GONE:
                 share = 0.0
             change += abs(share - population[i])
             population[i] = share

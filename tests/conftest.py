@@ -60,7 +60,7 @@ def make_extraction():
         cloud = PointCloud(POINTS) if cloud is None else cloud
         shapes = [Cylinder((0, 0, 2), (0, 0, 1), i + 1.0, 4.0) for i in range(cylinders)]
         fits = [
-            CylinderFit(shape, max(24 - i, 1), 0.25, 2 * np.pi, 3, 0.5, {"slope": 0.125})
+            CylinderFit(shape, max(24 - i, 1), 0.25, 2 * np.pi, 3, 0.5, evidence={"slope": 0.125})
             for i, shape in enumerate(shapes)
         ]
         return Extraction(

@@ -50,7 +50,7 @@ def test_the_conversation_is_on_standard_error(run_cylx, scan):
     assert said[0] == f"{scan}: 2 cylinders, written to {written}"
     assert said[1] == "warning: made by hand"
     assert said[2].split()[:4] == ["id", "radius", "height", "coverage"]
-    assert said[4].split() == ["0", "1", "4", "360°", "24", "0.25", "0.50", "0.000", "0.000", "1.000"]
+    assert said[4].split() == ["0", "1", "4", "360°", "24", "0.25", "-", "0.000", "0.000", "1.000"]
     assert len(said) == 6
 
 

@@ -129,10 +129,12 @@ def test_with_a_zero_diagonal_the_largest_camp_wins(dynamics, seed):
 @given(seed=seeds, start=st.booleans())
 def test_with_a_unit_diagonal_one_strategy_is_left(dynamics, seed, start):
     payoff, owner = camps(seed, [10, 5], diagonal=1.0, within=(0.6, 0.95))
-    first = np.random.default_rng(seed).dirichlet(np.ones(15)) if start else None
+    # infection-immunization steps exactly onto the unstable balance of two, if nothing breaks their symmetry
+    random = start or dynamics == "infection-immunization"
+    first = np.random.default_rng(seed).dirichlet(np.ones(15)) if random else None
     population = settle(payoff, dynamics, first)
     assert np.sort(population)[-1] > 1 - 1e-6
-    if not start:
+    if not random:
         assert owner[population.argmax()] == 0
 
 

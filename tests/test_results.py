@@ -118,7 +118,9 @@ def test_vectors_have_no_negative_zeros(make_extraction):
 
 
 def test_evidence_that_is_not_finite_is_left_out():
-    fit = CylinderFit(Cylinder((0, 0, 0), (0, 0, 1), 1.0), 1, 0.0, 1.0, 1, 1.0, {"a": np.inf, "b": np.nan, "c": 2})
+    fit = CylinderFit(
+        Cylinder((0, 0, 0), (0, 0, 1), 1.0), 1, 0.0, 1.0, 1, 1.0, evidence={"a": np.inf, "b": np.nan, "c": 2}
+    )
     assert ResultCylinder.of(0, fit).evidence == {"c": 2.0}
 
 

@@ -166,7 +166,8 @@ def verify(
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
     }
-    confidence, worst = weigh({**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff})
+    probability, worst = weigh({**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff})
+    confidence = round(probability, 3)  # further digits would order equals by chance
     reason = _refusal(measures, len(points), coverage, config) or ("" if confidence >= config.min_confidence else worst)
     return Verdict(reason, confidence, measures, coverage, points, shape["offset_error"], shape["tilt_error"])
 
@@ -186,13 +187,19 @@ def _refusal(measures: dict[str, float], count: int, coverage: float, config: Ve
 def covered_angle(angles: FloatArray) -> tuple[float, MaskArray]:
     """Give the angle that points cover about an axis, and which of the sectors do.
 
-    A sector counts if it holds at least 15 % of what a typical filled one does.
+    A sector counts if it holds at least 15 % of what a typical filled one does. The angle is summed over finer sectors
+    than the mask has where there are points enough for it.
     """
     if len(angles) == 0:
         return 0.0, np.zeros(SECTORS, np.bool_)
-    counts = np.bincount(_sector(angles), minlength=SECTORS)
-    filled = counts > max(0.5, 0.15 * float(np.median(counts[counts > 0])))
-    return float(filled.sum()) * 2.0 * math.pi / SECTORS, filled
+    fine = int(np.clip(len(angles) // 20, SECTORS, 360))
+    return float(_filled(angles, fine).mean()) * 2.0 * math.pi, _filled(angles, SECTORS)
+
+
+def _filled(angles: FloatArray, sectors: int) -> MaskArray:
+    index = ((angles / (2.0 * np.pi) + 0.5) * sectors).astype(np.int64) % sectors
+    counts = np.bincount(index, minlength=sectors)
+    return np.asarray(counts > max(0.5, 0.15 * float(np.median(counts[counts > 0]))), dtype=np.bool_)
 
 
 def _sector(angles: FloatArray) -> NDArray[np.int64]:
