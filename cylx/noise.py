@@ -172,14 +172,19 @@ def _balls(
     near: IndexArray,
     radius: FloatArray,
 ) -> None:
-    found = np.empty(len(points) if len(points) < 20000 else 20000, np.int64)
+    everybody = np.arange(len(points))
+    room = np.empty(len(points) if len(points) < 20000 else 20000, np.int64)
     for s in range(len(sample)):
         center = points[sample[s]]
         reach = side
+        found = room
         n = gather_ball(points, cells, starts, side, center, reach, found)
         while n <= size:
             reach *= 1.5
-            n = gather_ball(points, cells, starts, side, center, reach, found)
+            if reach > 12.0 * side:  # far from most others: there are more cells about it than points
+                found, n = everybody, len(points)
+            else:
+                n = gather_ball(points, cells, starts, side, center, reach, found)
         squares = np.empty(n)
         for a in range(n):
             i = found[a]

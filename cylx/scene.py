@@ -21,6 +21,12 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 
+STRAY = 40.0
+"""A cloud this many times as wide as its points deviate from their mean may have strays: a few points far away."""
+FAR = 1024.0
+"""Points further from the others than this, in widths of 98 % of them, are strays."""
+
+
 def check_usable(points: FloatArray, place: str) -> None:
     """Refuse a cloud in which no cylinder could be told from anything else.
 
@@ -32,6 +38,8 @@ def check_usable(points: FloatArray, place: str) -> None:
     remedy = "a cylinder needs at least 5 points that do not lie on one plane"
     if len(points) < 5:
         raise InputError(place, f"only {len(points)} usable point{'s' if len(points) != 1 else ''}", remedy)
+    corner, side = cell_cube(points)
+    points = points[((points >= corner) & (points <= corner + side)).all(axis=1)]
     low, high = points.min(axis=0), points.max(axis=0)
     extent = float(np.linalg.norm(high - low))
     if extent == 0:
@@ -47,13 +55,36 @@ def check_usable(points: FloatArray, place: str) -> None:
         raise InputError(place, "all points lie on one plane", remedy)
 
 
+def cell_cube(points: FloatArray, enough: float = 0.0) -> tuple[FloatArray, float]:
+    """Give corner and side of the cube that the cells fill: that of all points, but for a few that stray far away.
+
+    A single point at zero in a scan with coordinates of millions would leave the scan one cell. Strays stay in the
+    cloud, in the cells at the border.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+    enough : float
+        A cube of this side can be resolved in any case.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    side = float((high - low).max())
+    if side <= max(enough, STRAY * float(np.abs(points - points.mean(axis=0)).mean(axis=0).max())):
+        return low, side
+    bounds = np.quantile(points, [0.01, 0.99], axis=0)
+    limit = max(enough, FAR * float(np.ptp(bounds, axis=0).max()))
+    if side <= limit or limit == 0:
+        return low, side
+    return bounds.mean(axis=0) - 0.5 * limit, limit
+
+
 def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray, float]:
     """Sort points along the Morton curve of their own bounding cube: an order that does not depend on the given one.
 
     Returns
     -------
     points : ndarray of shape (N, 3)
-        Sorted, from zero.
+        Sorted, from the corner of `cell_cube`.
     order : ndarray of shape (N,)
         Where each sorted point stood.
     codes : ndarray of shape (N,)
@@ -61,9 +92,10 @@ def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexAr
     unit : float
         Side of the smallest cell.
     """
-    offsets = points - points.min(axis=0)
-    unit = float(offsets.max()) / (2**BITS - 2)
-    codes = morton_codes(offsets, unit)
+    corner, side = cell_cube(points)
+    offsets = points - corner
+    unit = side / (2**BITS - 2)
+    codes = morton_codes(np.clip(offsets, 0.0, side), unit)
     order = np.argsort(codes)
     return offsets[order], order, codes[order], unit
 
@@ -117,12 +149,13 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
     spacing = config.scene.spacing or spacing
     scene = Scene(spacing, noise, float(np.linalg.norm(np.ptp(points, axis=0))))
     window = max(config.candidates.window_spacings * dense, config.candidates.window_noises * noise) / spacing
-    ordered /= spacing
     # cells are powers of two of a voxel that puts about 6 x 6 points of a plane into the radius of the smallest window
     voxel = window / 6.0
-    level = max(0, min(BITS - 1, math.floor(math.log2(2.0**BITS * voxel / (float(ordered.max()) + voxel)))))
-    unit = voxel / 2.0**level
-    codes = morton_codes(ordered, unit)
+    corner, side = cell_cube(points, 2.0**BITS * voxel * spacing)
+    ordered, side = (points[order] - corner) / spacing, side / spacing
+    level = max(0, min(BITS - 1, math.floor(math.log2(2.0**BITS * voxel / (side + voxel)))))
+    unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # of a cloud wider than 2^21 voxels they are coarser
+    codes = morton_codes(np.clip(ordered, 0.0, side), unit)
     again = np.argsort(codes, kind="stable")
     frame = Frame(
         points=np.ascontiguousarray(ordered[again]),
@@ -132,7 +165,7 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
         voxel_level=level,
         window=window,
         noise=Noise(sizes / spacing, deviations * (noise / measured) / spacing),
-        origin=points.min(axis=0),
+        origin=corner,
         spacing=spacing,
     )
     return frame, scene

@@ -14,6 +14,7 @@ from cylx.noise import half_sample_mode
 from cylx.records import Noise
 from cylx.scene import (
     canonical_order,
+    cell_cube,
     check_usable,
     make_frame,
     measure_scene,
@@ -177,6 +178,36 @@ def test_the_canonical_order_is_one_of_the_points(seed):
     assert np.array_equal(codes, morton_codes(ordered, unit))
     shuffle = rng.permutation(60)
     assert np.array_equal(canonical_order(points[shuffle])[0], ordered)
+
+
+@pytest.mark.parametrize("away", [1e2, 1e4, 1e6])
+@pytest.mark.parametrize("count", [1, 20])
+def test_a_few_points_far_away_change_nothing(small, away, count):
+    points, scene = small
+    rng = np.random.default_rng(2)
+    strays = points.mean(axis=0) + away * rng.choice([-1, 1], (count, 3)) * rng.uniform(0.5, 1, (count, 3))
+    cloud = np.concatenate([points, strays])
+    check_usable(cloud, "scan.ply")
+    assert_same(measure_scene(cloud), scene, 1.0, 0.03)
+    frame, _ = make_frame(cloud, Config())
+    assert np.allclose(
+        frame.points * frame.spacing + frame.origin, cloud[frame.order], rtol=0, atol=1e-12 * away + 1e-12
+    )
+    assert np.isclose(frame.unit * 2**frame.voxel_level, frame.window / 6)
+
+
+def test_points_at_zero_do_not_hide_what_is_flat_or_cylinders():
+    with pytest.raises(InputError, match="all points lie on one plane"):
+        check_usable(np.concatenate([np.repeat(FLAT, 10, axis=0) + UTM, np.zeros((1, 3))]), "scan.ply")
+    check_usable(np.concatenate([RNG.random((500, 3)) + UTM, np.zeros((1, 3))]), "scan.ply")
+
+
+def test_half_of_a_cloud_is_no_stray():
+    rng = np.random.default_rng(4)
+    points = np.concatenate([rng.random((300, 3)), rng.random((300, 3)) + 1e9])
+    corner, side = cell_cube(points)
+    assert np.array_equal(corner, points.min(axis=0))
+    assert side == np.ptp(points, axis=0).max()
 
 
 @pytest.fixture(scope="module")
