@@ -43,17 +43,19 @@ def regret(payoff, population):
     return (fitness - mean).max(), ((mean - fitness) * population).max()
 
 
+@both
 @laws
-@given(seeds, st.integers(2, 15), st.floats(0.2, 1.0), st.sampled_from([0.0, 0.5, 1.0]))
-def test_replicators_never_lose_payoff(seed, n, density, diagonal):
+@given(seed=seeds, n=st.integers(2, 15), density=st.floats(0.2, 1.0), diagonal=st.sampled_from([0.0, 0.5, 1.0]))
+def test_no_step_loses_payoff(dynamics, seed, n, density, diagonal):
     payoff = random_payoff(seed, n, density=density, diagonal=diagonal)
     population = np.random.default_rng(seed + 1).dirichlet(np.ones(n))
     last = population @ payoff @ population
     for _ in range(60):
-        after = evolve(payoff, dynamics="replicator", max_iterations=1, tolerance=1e-15, start=population)
+        after = evolve(payoff, dynamics=dynamics, max_iterations=1, tolerance=1e-15, start=population)
         now = after @ payoff @ after
-        assert now >= last * (1 - 1e-12)
-        assert (after[population == 0] == 0).all()  # nobody comes back
+        assert now >= last - 1e-8  # what is nearly nothing becomes nothing
+        if dynamics == "replicator":
+            assert (after[population == 0] == 0).all()  # nobody comes back
         population, last = after, now
 
 

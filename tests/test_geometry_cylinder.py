@@ -88,6 +88,17 @@ def test_a_frame_is_right_handed_and_unit(seed):
     assert np.linalg.det(frame) > 0
 
 
+def test_outside_is_positive_and_heights_and_angles_turn_to_the_right():
+    shape = Cylinder((1, 2, 3), (0, 0, 1), radius=2.0, height=9.0)
+    points = np.array([[4.0, 2, 0], [1, 2.5, 3], [1, 0, 8]])
+    assert surface_distances(points, shape).tolist() == [1.0, -1.5, 0.0]
+    heights, distances, angles = cylinder_coordinates(points, shape.point, shape.direction)
+    assert heights.tolist() == [-3.0, 0.0, 5.0]
+    assert distances.tolist() == [3.0, 0.5, 2.0]
+    # from x to y is a quarter turn about z, from y to -y a half
+    assert np.allclose(np.exp(1j * np.diff(angles)), [1j, -1])
+
+
 @laws
 @given(seeds)
 def test_coordinates_build_the_points_again(seed):
