@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from cylx.config import Config
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, Finding, Ground, Segment
+from cylx.records import Candidates, Cluster, Finding, Ground, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
-from cylx.stages.clustering import CandidateGame, agreement
+from cylx.stages.clustering import CandidateGame, agreement, is_contradicted
 from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
 
@@ -56,19 +56,17 @@ class Turns:
         rejected: Counter[str] = Counter()
         while (cluster := self._game.next_cluster()) is not None:
             segment = average_cluster(self._players, cluster, self._config.averaging)
-            fitted = self._fit(segment)
+            fitted: Segment | None
             found: Finding | str
-            if isinstance(fitted, str):
-                found = fitted
-            elif self._removes and any(is_part_of(fitted, finding.segment) for finding in findings):
-                found = "found before"
+            if self._config.verification.enabled and is_contradicted(agreement(self._witnesses, segment)):
+                fitted, found = segment, "agreement"
             else:
-                found = self._judge(fitted, len(cluster.members), cluster.payoff)
+                fitted, found = self._try(segment, cluster, findings)
             if isinstance(found, Finding):
                 findings.append(found)
             else:
                 rejected[found] += 1
-            if self._removes and isinstance(fitted, Segment):
+            if self._removes and fitted is not None:
                 # what the like of a refused segment would lead to is known, too
                 closely = not isinstance(found, Finding)
                 self._game.withdraw(self._game.explained_by(fitted, closely=closely))
@@ -78,6 +76,15 @@ class Turns:
         journal.reports.append(self._game.report())
         journal.report("verification", len(findings) + rejected.total(), len(findings), rejected)
         return findings
+
+    def _try(self, average: Segment, cluster: Cluster, findings: list[Finding]) -> tuple[Segment | None, Finding | str]:
+        """Fit an average and judge it: the fitted segment, and the finding or the reason why it is none."""
+        fitted = self._fit(average)
+        if isinstance(fitted, str):
+            return None, fitted
+        if self._removes and any(is_part_of(fitted, finding.segment) for finding in findings):
+            return fitted, "found before"
+        return fitted, self._judge(fitted, len(cluster.members), cluster.payoff)
 
     def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""

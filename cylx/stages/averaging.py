@@ -138,7 +138,11 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     end = BEYOND * half
     points = _own_points(ground, segment.model, end, 2.0 * width, most)
     kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-    fit = fit_cylinder(points, segment.model, low=-end, high=end, kernel=kernel, steps=60) if len(points) > 19 else None
+    fit = (
+        fit_cylinder(points, segment.model, low=-end, high=end, kernel=kernel, steps=15 if most else 60)
+        if len(points) > 19
+        else None
+    )
     if fit is None:
         return "no fit"
     model, spread = fit

@@ -164,6 +164,15 @@ def agreement(windows: Candidates, segment: Segment) -> tuple[int, int]:
     return int(consistent.sum()), int(near.sum())
 
 
+def is_contradicted(counts: tuple[int, int]) -> bool:
+    """Tell from the counts of `agreement` whether so many windows disagree that a fit would be in vain.
+
+    Of true cylinders nearly all windows agree, a third at the very least; a fifth is not reached by chance.
+    """
+    consistent, near = counts
+    return near >= 12 and consistent + math.sqrt(max(consistent, 1.0)) < 0.2 * near
+
+
 def _near(candidates: Candidates, segment: Segment, margin: float) -> tuple[NDArray[np.bool_], FloatArray]:
     """Tell which candidates lie along a cylinder's height and some radii more, and how far from its axis."""
     offsets = candidates.points - segment.model[:3]
