@@ -1,0 +1,176 @@
+"""What is measured of a segment: shapes that are no cylinders show it in the measure that is called after them."""
+
+import numpy as np
+import pytest
+
+from cylx.config import Config, VerificationConfig
+from cylx.geometry.cells import Cells
+from cylx.geometry.cylinder import Cylinder
+from cylx.records import Ground, Noise, Segment
+from cylx.scene import make_frame
+from cylx.stages.verification import covered_angle, look_at, verify
+from cylx.synthetic.surfaces import Frustum, Mantle, Sphere
+
+SIGMA = 0.01
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def world(points, radius=1.0, half=2.0, flat=0.0, sigma=SIGMA):
+    """Give the ground of points, and the segment about the z axis of the scene."""
+    frame, _ = make_frame(points, Config())
+    noise = Noise(np.ones(1), np.array([sigma / frame.spacing]))
+    ground = Ground(Cells(frame.points, frame.codes), np.full(len(points), flat), noise)
+    model = np.concatenate([-frame.origin, UP * frame.spacing, [radius]]) / frame.spacing
+    model[3:6] = UP
+    return ground, Segment(model, half / frame.spacing, sigma / frame.spacing)
+
+
+def noisy(surface, n=3000, seed=0):
+    rng = np.random.default_rng(seed)
+    return surface.sample(rng, n) + SIGMA * rng.standard_normal((n, 3))
+
+
+def pipe(arc_deg=360.0, height=4.0, n=3000):
+    return noisy(Mantle(Cylinder((0, 0, 0), UP, 1.0, height), 0.0, np.radians(arc_deg)), n)
+
+
+def judge(points, agreement=(40, 42), payoff=0.8, config=None, **place):
+    ground, segment = world(points, **place)
+    return verify(segment, ground, payoff, agreement, config or VerificationConfig())
+
+
+def test_a_cylinder_passes_and_shows_nothing_else():
+    verdict = judge(pipe())
+    assert verdict.reason == ""
+    assert verdict.confidence > 0.95
+    measures = verdict.measures
+    assert np.isclose(measures["noise_ratio"], 1.0, atol=0.1)
+    assert measures["lack_of_fit"] < 1.5
+    assert measures["inside"] < 0.02
+    assert measures["outside"] < 0.02
+    assert measures["curvature"] > 1000
+    assert abs(measures["slope"]) < 4 * measures["slope_error"]
+    assert abs(measures["bulge"]) < 4 * measures["bulge_error"]
+    assert np.isclose(measures["height_radii"], 4.0)
+    assert np.isclose(verdict.coverage, 2 * np.pi, rtol=0.02)
+    assert 2900 < len(verdict.points) <= 3000
+
+
+def test_errors_are_those_of_the_bound():
+    ground, segment = world(pipe())
+    verdict = verify(segment, ground, 0.8, (40, 42), VerificationConfig())
+    # over a full turn: 2 sigma / sqrt(n) of the place, 2 sigma sqrt(3) / (h / 2) / sqrt(n) of the angle
+    noise, n = SIGMA * segment.model[6], len(verdict.points)
+    assert np.isclose(verdict.offset_error, 2 * noise / np.sqrt(n), rtol=0.1)
+    assert np.isclose(verdict.tilt_error, 2 * noise * np.sqrt(3) / segment.half / np.sqrt(n), rtol=0.1)
+
+
+def test_nothing_and_a_few_points_are_no_cylinder():
+    far = pipe() + 50.0 * np.eye(3)[0]
+    ground, segment = world(np.concatenate([far, pipe(n=15)]))
+    verdict = verify(segment, ground, 0.8, (0, 0), VerificationConfig())
+    assert (verdict.reason, verdict.confidence) == ("too few points", 0.0)
+    assert len(verdict.points) <= 15
+
+
+@pytest.mark.parametrize("taper_deg", [3.0, 8.0])
+def test_a_cone_shows_its_slope(taper_deg):
+    slope = np.tan(np.radians(taper_deg))
+    verdict = judge(noisy(Frustum(np.zeros(3), UP, 1 - slope / 2, 1 + slope / 2, 1.0)), half=0.5)
+    assert np.isclose(abs(verdict.measures["slope"]), slope, rtol=0.4)
+    assert verdict.reason != ""
+
+
+def test_a_strip_of_a_sphere_shows_its_bulge():
+    points = noisy(Sphere(np.zeros(3), 1.0), 12000)
+    verdict = judge(points[np.abs(points[:, 2]) < 0.25], half=0.2, radius=0.99)
+    assert 0.7 < verdict.measures["bulge"] < 1.3  # a sphere has one
+    assert verdict.reason != ""
+
+
+def test_a_flat_strip_shows_no_curvature():
+    strip = np.column_stack([np.full(2000, 1.0), *np.random.default_rng(1).uniform([-0.1, -2], [0.1, 2], (2000, 2)).T])
+    verdict = judge(strip + SIGMA * np.random.default_rng(2).standard_normal((2000, 3)))
+    assert verdict.measures["curvature"] < 100 < judge(pipe()).measures["curvature"]
+    assert verdict.reason != ""
+
+
+@pytest.mark.parametrize(("distance", "name"), [(0.8, "inside"), (1.15, "outside")])
+def test_points_beside_the_surface_are_counted_against_it(distance, name):
+    other = pipe() * [distance, distance, 1]
+    measures = judge(np.concatenate([pipe(), other])).measures
+    assert np.isclose(measures[name], 1.0, atol=0.1)
+    assert measures["inside" if name == "outside" else "outside"] < 0.05
+
+
+def test_a_lid_is_forgiven():
+    rng = np.random.default_rng(4)
+    turn, distance = rng.uniform(0, 2 * np.pi, 800), np.sqrt(rng.random(800))
+    lid = np.column_stack([distance * np.cos(turn), distance * np.sin(turn), np.full(800, 1.95)])
+    assert judge(np.concatenate([pipe(), lid])).measures["inside"] < 0.03
+
+
+def test_sides_that_go_on_show_a_rounded_edge():
+    rng = np.random.default_rng(5)
+    sigma = 0.2 * SIGMA
+    arc = Mantle(Cylinder((0, 0, 0), UP, 1.0, 4.0), 0.0, np.radians(90)).sample(rng, 1200)  # from y to -x about z
+    heights, away, on = rng.uniform(-2, 2, 800), rng.random(800), np.ones(800)
+    sides = np.concatenate([np.column_stack([away, on, heights]), np.column_stack([-on, -away, heights])])
+    points = np.concatenate([arc, sides])
+    points += sigma * rng.standard_normal(points.shape)
+    assert judge(points[:1200], sigma=sigma).measures["tangent"] < 0.05
+    assert judge(points[:2000], sigma=sigma).measures["tangent"] < 0.05  # one side may be a wall that a pipe touches
+    assert judge(points, sigma=sigma).measures["tangent"] > 0.5
+
+
+@pytest.mark.parametrize(
+    ("limit", "reason"),
+    [
+        ({"min_inliers": 5000}, "too few points"),
+        ({"min_coverage_deg": 200.0}, "coverage"),
+        ({"min_height": 5.0}, "height"),
+    ],
+)
+def test_limits_of_the_user_are_kept(limit, reason):
+    points = pipe(180.0)
+    assert judge(points).reason == ""
+    assert judge(points, config=VerificationConfig(**limit)).reason == reason
+
+
+def test_candidates_that_disagree_speak_against_it():
+    trusted = [judge(pipe(120.0), agreement=pair).confidence for pair in ((40, 40), (20, 40), (0, 40))]
+    assert trusted[0] > trusted[1] > trusted[2]
+    assert judge(pipe(120.0), payoff=0.9).confidence > judge(pipe(120.0), payoff=0.3).confidence
+
+
+@pytest.mark.parametrize("arc_deg", [20, 45, 90, 180, 300, 360])
+@pytest.mark.parametrize("n", [400, 40000])
+def test_the_covered_angle_is_that_of_the_arc(arc_deg, n):
+    rng = np.random.default_rng(6)
+    angles = rng.uniform(0, np.radians(arc_deg), n) + 1.0
+    angles = (angles + np.pi) % (2 * np.pi) - np.pi
+    covered, sectors = covered_angle(angles)
+    assert np.isclose(np.degrees(covered), arc_deg, atol=15 if n < 1000 else 3)
+    assert sectors.dtype == bool
+    assert abs(sectors.mean() * 360 - arc_deg) <= 20
+
+
+def test_no_points_cover_nothing():
+    covered, sectors = covered_angle(np.empty(0))
+    assert covered == 0.0
+    assert not sectors.any()
+
+
+def test_the_shell_is_what_is_about_the_segment():
+    ground, segment = world(np.concatenate([pipe(), pipe() * [3, 3, 1]]))
+    shell = look_at(segment, ground)
+    assert (np.abs(shell.heights) <= 1).all()
+    assert (shell.residuals <= 0.5 * segment.model[6] * (1 + 1e-9)).all()
+    assert np.array_equal(shell.on, np.abs(shell.residuals) < 3 * shell.deviation)
+    assert len(shell.indices) < 3100
+    assert not shell.flat.any()
+    half = shell.thinned(2)
+    assert len(half.indices) == len(half.on) == (len(shell.indices) + 1) // 2
+    ground, segment = world(pipe(), flat=1e9)
+    assert look_at(segment, ground).flat.all()
+    assert not look_at(segment, ground).on.any()
