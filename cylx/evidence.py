@@ -1,12 +1,12 @@
 """From measures to a confidence: the evidence weighed, not a heap of thresholds.
 
 Each measure is turned into a term that grows with doubt or with trust and saturates, and a logistic regression says how
-much each counts. The weights were fitted to 14 000 fits, a tenth of them true, in about 100 scenes with known cylinders:
-rooms with boxes sharp and rounded, spheres, ellipsoids, cones, elbows, beams, wavy surfaces, walls and pipes close to
-them, cylinders out of round, independent and correlated noise, racks of pipes from four viewpoints, and scans of
-household objects. No term may speak against its own meaning: the signs were fixed before the fit. Over scenes left out
-of the fit, of the cylinders with a confidence of 0.9 or more 99 in 100 were true, of those between 0.5 and 0.9 three
-quarters.
+much each counts. The weights were fitted to 14 000 fits, a tenth of them true, in about 100 scenes with known
+cylinders: rooms with boxes sharp and rounded, spheres, ellipsoids, cones, elbows, beams, wavy surfaces, walls and pipes
+close to them, cylinders out of round, independent and correlated noise, racks of pipes from four viewpoints, and scans
+of household objects. No term may speak against its own meaning: the signs were fixed before the fit. Over scenes left
+out of the fit, of the cylinders with a confidence of 0.9 or more 99 in 100 were true, of those between 0.5 and 0.9
+three quarters.
 """
 
 from __future__ import annotations
