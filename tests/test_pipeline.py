@@ -272,7 +272,8 @@ def test_the_paper_finds_two_cans_one_after_the_other():
     turn = Rotation.from_rotvec([1.2, 0, 0]).as_matrix()
     one, other = (single(points=3000, seed=seed) for seed in (1, 2))
     points = np.concatenate([one.points, other.points @ turn.T + [4, 0, 0]])
-    config = load_config(preset="paper", overrides=["slicing.planes=40"])
+    # nothing is verified, so chance clusters may follow: the number of cylinders is asked for
+    config = load_config(preset="paper", overrides=["slicing.planes=40", "max_cylinders=2"])
     upright = one.cylinders[0].cylinder
     truths = [upright, type(upright)((4, 0, 0), turn @ upright.direction, 1.0, 4.0)]
     cans = run(points, config)

@@ -17,6 +17,8 @@ from cylx.stages.slicing import cut_slice, draw_planes
 
 FloatArray = NDArray[np.float64]
 
+LARGE = 6.0
+"""Flat windows of more than this many times the smallest one's radius hold planes; a cylinder is flat in small ones."""
 LINK = 4.0
 """Points of a slice within this many spacings are connected."""
 
@@ -41,8 +43,8 @@ def ellipses_of_slices(
     planes = draw_planes(frame, config.slicing, config.seed)
     thickness = (config.slicing.thickness or 0.0) / frame.spacing
     tolerance = (config.ellipses.tolerance or 0.0) / frame.spacing
-    # points of flat windows are explained already; the paper's preset has none
-    eligible = flatness == 0.0 if flatness.any() else None
+    # points of large flat windows are explained already; the paper's preset has none
+    eligible = flatness < LARGE * frame.window if flatness.any() else None
 
     def work(index: int) -> list[EllipseFit] | None:
         section = cut_slice(frame, planes[index], thickness, eligible)

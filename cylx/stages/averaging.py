@@ -182,6 +182,8 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
         if max(-low, high) < 0.95 * reach:
             break
         reach *= 2.0
+    if high - low < 0.2 * radius:
+        return "too short"
     on = (heights >= low) & (heights <= high)
     spread = 1.4826 * float(np.median(np.abs(distances[on] - radius)))
     moved = np.concatenate([model[:3] + 0.5 * (low + high) * model[3:6], model[3:]])

@@ -26,6 +26,8 @@ CROWD = 400
 """Most candidates of a local population, the best connected ones."""
 
 
+PATIENCE = 3
+"""Where all play, this many small clusters in a row end it: the paper says only "until all are extracted"."""
 WITNESS = 0.4
 """Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
 smaller."""
@@ -46,6 +48,7 @@ class CandidateGame:
         self._alive = np.ones(len(candidates), np.bool_)
         self._dropped = {"too small": 0, "too little payoff": 0}
         self._clusters = 0
+        self._patience = PATIENCE
         if config.kernel == "screw":
             dense = screw_payoff(candidates.models, candidates.parents, config.screw_scale, config.min_radius_ratio)
             self._payoff = SparsePayoff.of(dense)
@@ -89,16 +92,16 @@ class CandidateGame:
             support = int(members.sum())
             if support < self._config.min_support:
                 self._dropped["too small"] += 1
-                if whole:
-                    return None
             elif mean < self._config.min_payoff:
                 self._dropped["too little payoff"] += 1
-                if whole:
-                    return None
             else:
+                self._patience = PATIENCE
                 self._clusters += 1
                 weights = population[members] + (0.0 if whole else 0.05 * population.max())
                 return Cluster(nodes[members], weights / weights.sum(), mean)
+            self._patience -= 1 if whole else 0
+            if self._patience == 0:
+                return None
 
     def withdraw(self, indices: IndexArray) -> None:
         """Take candidates out of the game: rows and columns zeroed (section 3.5)."""

@@ -241,7 +241,7 @@ def _lack_of_fit(shell: Shell, deviation: float) -> tuple[float, float]:
     if full.sum() <= 6:
         return 1.0, 0.0
     squares = float((sums[full] ** 2 / counts[full]).sum())
-    variance = deviation**2
+    variance = max(deviation**2, 1e-300)  # points may lie on the surface exactly
     excess = max(0.0, (squares - float(full.sum()) * variance) / float(counts[full].sum()))
     return squares / variance / max(int(full.sum()) - 5, 1), math.sqrt(excess)
 
