@@ -1,12 +1,19 @@
 """Fixtures of the tests: the command line in process and out of it, and a pipeline that answers at once."""
 
 import inspect
+import os
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import settings
+
+# where a red run costs most the examples are the same ones every time; everywhere else they are new ones
+settings.register_profile("ci", derandomize=True, deadline=None)
+settings.register_profile("anew", deadline=None)
+settings.load_profile("ci" if os.environ.get("CI") else "anew")
 
 CIRCLE = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 POINTS = np.round(np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE), np.arange(24) % 5]), 6)
