@@ -95,7 +95,7 @@ def configured(command: Command) -> Command:
 
     for option in reversed(_CONFIGURATION):
         with_settings = option(with_settings)
-    return with_settings  # type: ignore[return-value]
+    return with_settings  # type: ignore[return-value]  # click keeps the signature
 
 
 _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
@@ -133,7 +133,7 @@ def talking(command: Command) -> Command:
 
     verbose = click.option("-v", "--verbose", is_flag=True, help="Say what each stage kept and dropped, and why.")
     quiet = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-    return quiet(verbose(with_talk))  # type: ignore[return-value]
+    return quiet(verbose(with_talk))  # type: ignore[return-value]  # as above
 
 
 def overwrite_option(command: Command) -> Command:

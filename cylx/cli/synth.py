@@ -90,7 +90,7 @@ def single(
     offset: tuple[float, ...],
     precision: str,
     overwrite: bool,
-    **parameters: Any,  # noqa: ANN401
+    **parameters: Any,  # noqa: ANN401  the options of the scene, of many types
 ) -> None:
     """Make one cylinder of radius 1, as in the paper.
 
@@ -127,7 +127,7 @@ def multi(
     precision: str,
     overwrite: bool,
     radius: Bounds,
-    **parameters: Any,  # noqa: ANN401
+    **parameters: Any,  # noqa: ANN401  the options of the scene, of many types
 ) -> None:
     """Make a room with cylinders, and with planes, boxes, spheres, cones and noise.
 

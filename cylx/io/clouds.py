@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _READERS: dict[str, Callable[[Input], NDArray[np.void]]] = {"ply": read_ply, "pcd": read_pcd, "xyz": read_xyz}
 
 
-def read_cloud(path: str | Path, *, format: str | None = None) -> PointCloud:  # noqa: A002
+def read_cloud(path: str | Path, *, format: str | None = None) -> PointCloud:  # noqa: A002  the word
     """Read a point cloud with all properties of its points.
 
     Parameters

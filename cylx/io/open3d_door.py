@@ -39,12 +39,12 @@ def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
         If open3d is not installed, or does not run here.
     """
     with contextlib.suppress(ImportError, OSError):
-        import libusb_package  # noqa: PLC0415
+        import libusb_package  # noqa: PLC0415  not everywhere
 
         ctypes.CDLL(str(libusb_package.get_library_path()), mode=ctypes.RTLD_GLOBAL)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        import open3d  # noqa: PLC0415
+        import open3d  # noqa: PLC0415  takes a second
     return open3d
 
 
