@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -11,6 +13,8 @@ from numpy.typing import NDArray
 from cylx.game import SparsePayoff
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
 
+PIECE = 4096
+"""Candidates that one thread takes at a time."""
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
@@ -57,6 +61,7 @@ def local_payoff(
     offset: float,
     radius: float,
     min_ratio: float,
+    threads: int = 1,
 ) -> SparsePayoff:
     """Give the payoffs of all pairs within reach: angle, offset at the candidates in radii, ratio of radii.
 
@@ -72,79 +77,150 @@ def local_payoff(
         Where the payoff has fallen to 1/e: radians, radii, relative difference.
     min_ratio : float
         Candidates whose radii differ more are incompatible.
+    threads : int
+        Does not change the result.
 
     Returns
     -------
     SparsePayoff
         exp(-sqrt((angle / a)^2 + (offset / o)^2 + ((1 - ratio) / p)^2)) where it exceeds 0.1, else nothing.
     """
-    order = np.argsort(models[:, 6], kind="stable")
-    models = np.ascontiguousarray(models[order])
-    parents, extents = parents[order], extents[order]
     least_ratio = max(min_ratio, 1.0 + math.log(CUT) * radius)
-    widths = angle, offset, radius
+    # by bins of the radius, of which only neighbours can be compatible, and along x within a bin
+    bins = np.floor(np.log(models[:, 6]) / -math.log(least_ratio)).astype(np.int64) if len(models) else np.empty(0)
+    order = np.lexsort((models[:, 0], bins)).astype(np.int64)
+    sorted_models = np.ascontiguousarray(models[order])
+    extents = extents[order]
+    bins, starts = np.unique(bins[order], return_index=True)
+    starts = np.append(starts, len(order)).astype(np.int64)
+    table = sorted_models, order, parents[order], extents, bins.astype(np.int64), starts
+    # one bin after the other, or pieces of it: the pieces do not depend on the number of threads
+    pieces = [
+        (int(b), int(first), int(min(first + PIECE, starts[b + 1])))
+        for b in range(len(bins))
+        for first in range(int(starts[b]), int(starts[b + 1]), PIECE)
+    ]
+    with ThreadPoolExecutor(threads) as pool:
+        found = list(pool.map(lambda piece: _pairs(*table, *piece, least_ratio, (angle, offset, radius)), pieces))
     counts = np.zeros(len(models) + 1, np.int64)
-    nothing = np.empty(0, np.int64), np.empty(0)
-    _pairs(models, parents, extents, least_ratio, *widths, counts[1:], np.empty(0, np.int64), *nothing, False)
+    for rows, columns, values in found:
+        _count(rows, columns, counts[1:])
     pointers = np.cumsum(counts)
-    columns, values = np.empty(pointers[-1], np.int64), np.empty(pointers[-1])
-    _pairs(models, parents, extents, least_ratio, *widths, counts[1:], pointers[:-1].copy(), columns, values, True)
-    # back from the order of radii to the order of the candidates
-    rows = order[np.repeat(np.arange(len(models)), counts[1:])]
-    columns = order[columns]
-    sort = np.lexsort((columns, rows))
-    starts = np.concatenate(([0], np.cumsum(np.bincount(rows, minlength=len(models))))).astype(np.int64)
-    return SparsePayoff(starts, columns[sort], values[sort])
+    indices, payoffs, ends = np.empty(pointers[-1], np.int64), np.empty(pointers[-1]), pointers[:-1].copy()
+    for rows, columns, values in found:
+        _enter(rows, columns, values, ends, indices, payoffs)
+    return SparsePayoff(pointers, indices, payoffs)
+
+
+@njit(cache=True, nogil=True)
+def _first_from(models: FloatArray, low: int, high: int, x: float) -> int:
+    """Give the first of the models low..high, sorted by x, that is not below `x`."""
+    while low < high:
+        middle = (low + high) >> 1
+        if models[middle, 0] < x:
+            low = middle + 1
+        else:
+            high = middle
+    return low
 
 
 @njit(cache=True, nogil=True)
 def _pairs(
     models: FloatArray,
+    order: IndexArray,
     parents: IndexArray,
     extents: FloatArray,
+    bins: IndexArray,
+    starts: IndexArray,
+    own: int,
+    first: int,
+    last: int,
     least_ratio: float,
-    angle: float,
-    offset: float,
-    radius: float,
-    counts: IndexArray,
-    ends: IndexArray,
+    widths: tuple[float, float, float],
+) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """Give the pairs of the candidates first..last of one bin with those after them in it and with the next bin."""
+    n, room = 0, 1024
+    rows, columns, values = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
+    for b in range(own, min(own + 2, len(bins))):
+        if bins[b] > bins[own] + 1:
+            continue
+        longest, largest = 0.0, 0.0
+        for j in range(starts[b], starts[b + 1]):
+            longest, largest = max(longest, extents[j]), max(largest, models[j, 6])
+        for i in range(first, last):
+            span = max(REACH * 0.5 * (models[i, 6] + largest), max(extents[i], longest))
+            begin = i + 1 if b == own else _first_from(models, starts[b], starts[b + 1], models[i, 0] - span)
+            for j in range(begin, starts[b + 1]):
+                if models[j, 0] > models[i, 0] + span:
+                    break
+                reach = max(REACH * 0.5 * (models[i, 6] + models[j, 6]), max(extents[i], extents[j]))
+                value = _play(models[i], models[j], reach, least_ratio, widths)
+                if value == 0.0 or parents[i] == parents[j]:
+                    continue
+                if n == room:
+                    rows, columns = _grown(rows), _grown(columns)
+                    values = _grown(values)
+                    room *= 2
+                rows[n], columns[n], values[n] = order[i], order[j], value
+                n += 1
+    return rows[:n], columns[:n], values[:n]
+
+
+@njit(cache=True, nogil=True)
+def _grown(values: NDArray[Any]) -> NDArray[Any]:
+    """Give an array twice as long that begins with the same values."""
+    out = np.empty(2 * len(values), values.dtype)
+    for i in range(len(values)):
+        out[i] = values[i]
+    return out
+
+
+@njit(cache=True, nogil=True)
+def _count(rows: IndexArray, columns: IndexArray, counts: IndexArray) -> None:
+    for k in range(len(rows)):
+        counts[rows[k]] += 1
+        counts[columns[k]] += 1
+
+
+@njit(cache=True, nogil=True)
+def _enter(
+    rows: IndexArray,
     columns: IndexArray,
     values: FloatArray,
-    fill: bool,
+    ends: IndexArray,
+    indices: IndexArray,
+    payoffs: FloatArray,
 ) -> None:
-    """Count the pairs of each row, or fill them in at `ends`; the models come by ascending radius."""
+    """Enter each pair into the rows of both, which have been filled up to `ends`."""
+    for k in range(len(rows)):
+        i, j = rows[k], columns[k]
+        indices[ends[i]], payoffs[ends[i]] = j, values[k]
+        indices[ends[j]], payoffs[ends[j]] = i, values[k]
+        ends[i] += 1
+        ends[j] += 1
+
+
+@njit(cache=True, nogil=True)
+def _play(
+    one: FloatArray, other: FloatArray, reach: float, least_ratio: float, widths: tuple[float, float, float]
+) -> float:
+    """Give the payoff of two candidates, 0 if they are out of reach or incompatible."""
     bound = -math.log(CUT)
-    sine = math.sin(min(1.5, bound * angle))
-    for i in range(len(models)):
-        for j in range(i + 1, len(models)):
-            ratio = models[i, 6] / models[j, 6]
-            if ratio < least_ratio:
-                break
-            mean = 0.5 * (models[i, 6] + models[j, 6])
-            reach = max(REACH * mean, max(extents[i], extents[j]))
-            dx, dy, dz = models[j, 0] - models[i, 0], models[j, 1] - models[i, 1], models[j, 2] - models[i, 2]
-            square = dx * dx + dy * dy + dz * dz
-            if square > reach * reach or parents[i] == parents[j]:
-                continue
-            cx = models[i, 4] * models[j, 5] - models[i, 5] * models[j, 4]
-            cy = models[i, 5] * models[j, 3] - models[i, 3] * models[j, 5]
-            cz = models[i, 3] * models[j, 4] - models[i, 4] * models[j, 3]
-            turn = math.sqrt(cx * cx + cy * cy + cz * cz)
-            if turn > sine:
-                continue
-            a = dx * models[i, 3] + dy * models[i, 4] + dz * models[i, 5]
-            b = dx * models[j, 3] + dy * models[j, 4] + dz * models[j, 5]
-            shift = 0.5 * (math.sqrt(max(0.0, square - a * a)) + math.sqrt(max(0.0, square - b * b))) / mean
-            strangeness = (math.asin(min(1.0, turn)) / angle) ** 2 + (shift / offset) ** 2
-            strangeness += ((1.0 - ratio) / radius) ** 2
-            if strangeness > bound * bound:
-                continue
-            if fill:
-                value = math.exp(-math.sqrt(strangeness))
-                columns[ends[i]], values[ends[i]] = j, value
-                columns[ends[j]], values[ends[j]] = i, value
-                ends[i] += 1
-                ends[j] += 1
-            else:
-                counts[i] += 1
-                counts[j] += 1
+    dx, dy, dz = other[0] - one[0], other[1] - one[1], other[2] - one[2]
+    square = dx * dx + dy * dy + dz * dz
+    ratio = min(one[6], other[6]) / max(one[6], other[6])
+    if square > reach * reach or ratio < least_ratio:
+        return 0.0
+    cx = one[4] * other[5] - one[5] * other[4]
+    cy = one[5] * other[3] - one[3] * other[5]
+    cz = one[3] * other[4] - one[4] * other[3]
+    turn = math.sqrt(cx * cx + cy * cy + cz * cz)
+    if turn > math.sin(min(1.5, bound * widths[0])):
+        return 0.0
+    a = dx * one[3] + dy * one[4] + dz * one[5]
+    b = dx * other[3] + dy * other[4] + dz * other[5]
+    shift = math.sqrt(max(0.0, square - a * a)) + math.sqrt(max(0.0, square - b * b))
+    shift /= one[6] + other[6]
+    strangeness = (math.asin(min(1.0, turn)) / widths[0]) ** 2 + (shift / widths[1]) ** 2
+    strangeness += ((1.0 - ratio) / widths[2]) ** 2
+    return math.exp(-math.sqrt(strangeness)) if strangeness <= bound * bound else 0.0

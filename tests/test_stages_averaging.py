@@ -10,7 +10,8 @@ from cylx.config import AveragingConfig, Config
 from cylx.geometry.cells import Cells
 from cylx.records import Candidates, Cluster, Ground, Noise, Segment
 from cylx.scene import make_frame
-from cylx.stages.averaging import average_cluster, measure_extent, refine, refit, visible_extent
+from cylx.geometry.extent import visible_extent
+from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.synthetic import single
 
 seeds = st.integers(0, 2**32 - 1)

@@ -59,6 +59,50 @@ class Cells:
         n = _gather_near(self.points, self._centers, self._reaches, self._starts, model, low, high, inner, outer, found)
         return found[:n]
 
+    def surface_points(
+        self,
+        model: FloatArray,
+        half: float,
+        width: float,
+        most: int | None,
+        marks: FloatArray,
+        limit: float,
+    ) -> FloatArray:
+        """Give the points near a cylinder's surface, about `most` of them, whose mark is below a limit.
+
+        Parameters
+        ----------
+        model : ndarray of shape (7,)
+            Middle of the axis, unit direction, radius.
+        half, width : float
+            Half the height, and the greatest distance from the surface.
+        most : int or None
+            Every so manyth point is taken.
+        marks : ndarray of shape (N,)
+        limit : float
+
+        Returns
+        -------
+        ndarray of shape (n, 3)
+        """
+        near = self.near_cylinder(model, -half, half, max(0.0, float(model[6]) - width), float(model[6]) + width)
+        stride = max(1, len(near) // most) if most else 1
+        points = np.empty(((len(near) + stride - 1) // stride, 3))
+        return points[: _copy_marked(self.points, near, stride, marks, limit, points)]
+
+
+@njit(cache=True, nogil=True)
+def _copy_marked(
+    points: FloatArray, near: IndexArray, stride: int, marks: FloatArray, limit: float, out: FloatArray
+) -> int:
+    n = 0
+    for a in range(0, len(near), stride):
+        i = near[a]
+        if marks[i] < limit:
+            out[n, 0], out[n, 1], out[n, 2] = points[i, 0], points[i, 1], points[i, 2]
+            n += 1
+    return n
+
 
 @njit(cache=True, nogil=True)
 def _fill_balls(points: FloatArray, starts: IndexArray, centers: FloatArray, reaches: FloatArray) -> None:

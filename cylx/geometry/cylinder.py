@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cylx.geometry.vectors import cross
+
 FloatArray = NDArray[np.float64]
 
 
@@ -130,9 +132,9 @@ def axis_frame(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
     direction = np.asarray(direction, dtype=np.float64)
     helper = np.zeros(3)
     helper[np.abs(direction).argmin()] = 1.0
-    first = np.cross(direction, helper)
+    first = cross(direction, helper)
     first /= np.linalg.norm(first)
-    return first, np.cross(direction, first)
+    return first, cross(direction, first)
 
 
 def surface_distances(points: FloatArray, cylinder: Cylinder) -> FloatArray:

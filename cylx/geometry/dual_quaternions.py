@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.geometry.lines import common_perpendicular
+from cylx.geometry.vectors import cross
 
 FloatArray = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ def _product(p: FloatArray, q: FloatArray) -> FloatArray:
     """Multiply quaternions (..., 4)."""
     pw, pv, qw, qv = p[..., :1], p[..., 1:], q[..., :1], q[..., 1:]
     scalar = pw * qw - (pv * qv).sum(-1, keepdims=True)
-    return np.concatenate([scalar, pw * qv + qw * pv + np.cross(pv, qv)], axis=-1)
+    return np.concatenate([scalar, pw * qv + qw * pv + cross(pv, qv)], axis=-1)
 
 
 def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
@@ -58,7 +59,7 @@ def screw(axis: FloatArray, foot: FloatArray, angle: FloatArray, shift: FloatArr
     """
     half, slide = 0.5 * np.asarray(angle)[..., None], 0.5 * np.asarray(shift)[..., None]
     cosine, sine = np.cos(half), np.sin(half)
-    moment = np.cross(foot, axis)
+    moment = cross(foot, axis)
     return np.concatenate(
         [cosine, sine * axis, -slide * sine, slide * cosine * axis + sine * moment],
         axis=-1,
@@ -203,5 +204,5 @@ def move_points(motion: FloatArray, points: FloatArray) -> FloatArray:
 def turn_vectors(motion: FloatArray, vectors: FloatArray) -> FloatArray:
     """Apply the rotation of a motion (8,) to vectors (..., 3)."""
     w, v = motion[0], motion[1:4]
-    twice = 2.0 * np.cross(v, vectors)
-    return np.asarray(vectors + w * twice + np.cross(v, twice))
+    twice = 2.0 * cross(v, vectors)
+    return np.asarray(vectors + w * twice + cross(v, twice))

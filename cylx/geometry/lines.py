@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.vectors import cross
+
 FloatArray = NDArray[np.float64]
 
 PARALLEL = 1e-8
@@ -39,7 +41,7 @@ def common_perpendicular(
     sign = np.where((first_directions * second_directions).sum(-1, keepdims=True) < 0, -1.0, 1.0)
     turned = sign * second_directions
     cosine = (first_directions * turned).sum(-1, keepdims=True)
-    normal = np.cross(first_directions, turned)
+    normal = cross(first_directions, turned)
     # rounding along the lines is much of the cross product of nearly parallel ones
     normal -= (normal * first_directions).sum(-1, keepdims=True) * first_directions
     sine = np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -48,13 +50,13 @@ def common_perpendicular(
     across = second_points - first_points
     square = np.where(parallel, 1.0, sine * sine)
     # as determinants: in differences of dot products nearly parallel lines lose all their digits
-    t1 = (np.cross(across, turned) * normal).sum(-1, keepdims=True) / square
-    t2 = (np.cross(across, first_directions) * normal).sum(-1, keepdims=True) / square
+    t1 = (cross(across, turned) * normal).sum(-1, keepdims=True) / square
+    t2 = (cross(across, first_directions) * normal).sum(-1, keepdims=True) / square
     t1 = np.where(parallel, 0.0, t1)
     t2 = np.where(parallel, -(across * turned).sum(-1, keepdims=True), t2)
     helper = np.zeros_like(first_directions)
     np.put_along_axis(helper, np.abs(first_directions).argmin(-1)[..., None], 1.0, axis=-1)
-    arbitrary = np.cross(first_directions, helper)
+    arbitrary = cross(first_directions, helper)
     arbitrary = arbitrary / np.linalg.norm(arbitrary, axis=-1, keepdims=True)
     axis = np.where(parallel, arbitrary, normal / np.where(parallel, 1.0, sine))
     return (

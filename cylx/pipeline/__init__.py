@@ -62,7 +62,8 @@ def extract_cylinders(
     with journal.stage("clustering"):
         players = thin_candidates(candidates) if config.clustering.population == "local" else candidates
         witnesses = windows if len(windows) else candidates
-        turns = Turns(CandidateGame(players, config.clustering), players, witnesses, ground, radii, config)
+        game = CandidateGame(players, config.clustering, threads)
+        turns = Turns(game, players, witnesses, ground, radii, config, threads)
     with journal.stage("averaging"):
         findings = turns.play(journal)
     with journal.stage("merging"):

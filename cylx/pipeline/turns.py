@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from itertools import repeat
 
 from cylx.config import Config
 from cylx.pipeline.journal import Journal
@@ -12,6 +14,10 @@ from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame, agreement, is_contradicted
 from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
+
+
+ROUND = 16
+"""Clusters fitted at the same time; the number does not depend on that of the threads, and so the result does not."""
 
 
 class Turns:
@@ -30,6 +36,8 @@ class Turns:
         Least and greatest radius, frame units; they hold for the fitted cylinders, too.
     config : Config
         Resolved.
+    threads : int
+        Does not change the result.
     """
 
     def __init__(
@@ -40,6 +48,7 @@ class Turns:
         ground: Ground,
         radii: tuple[float, float],
         config: Config,
+        threads: int,
     ) -> None:
         self._game = game
         self._players = players
@@ -47,6 +56,7 @@ class Turns:
         self._ground = ground
         self._radii = radii
         self._config = config
+        self._threads = threads
         # the paper takes no more than the winners out of the game (section 3.5)
         self._removes = config.clustering.population == "local"
 
@@ -54,37 +64,57 @@ class Turns:
         """Take cluster after cluster until none is left, or until as many cylinders as asked for are found."""
         findings: list[Finding] = []
         rejected: Counter[str] = Counter()
-        while (cluster := self._game.next_cluster()) is not None:
-            segment = average_cluster(self._players, cluster, self._config.averaging)
-            fitted: Segment | None
-            found: Finding | str
-            if self._config.verification.enabled and is_contradicted(agreement(self._witnesses, segment)):
-                fitted, found = segment, "agreement"
-            else:
-                fitted, found = self._try(segment, cluster, findings)
-            if isinstance(found, Finding):
-                findings.append(found)
-            else:
-                rejected[found] += 1
-            if self._removes and fitted is not None:
-                # what the like of a refused segment would lead to is known, too
-                closely = not isinstance(found, Finding)
-                self._game.withdraw(self._game.explained_by(fitted, closely=closely))
-            journal.advance()
-            if self._enough(findings):
-                break
+        with ThreadPoolExecutor(self._threads) as pool:
+            while clusters := self._next_clusters():
+                averages = [average for _, average in clusters]
+                fits = pool.map(self._try, clusters, repeat(tuple(finding.segment for finding in findings)))
+                for average, (fitted, found) in zip(averages, list(fits), strict=True):
+                    if isinstance(found, Finding) and self._is_known(found.segment, findings):
+                        found = "found before"  # by another of these clusters
+                    if isinstance(found, Finding):
+                        findings.append(found)
+                    else:
+                        rejected[found] += 1
+                    if self._removes:
+                        # what the like of a refused segment would lead to is known, too
+                        closely = not isinstance(found, Finding)
+                        self._game.withdraw(self._game.explained_by(fitted or average, closely=closely))
+                    journal.advance()
+                if self._enough(findings):
+                    break
         journal.reports.append(self._game.report())
         journal.report("verification", len(findings) + rejected.total(), len(findings), rejected)
         return findings
 
-    def _try(self, average: Segment, cluster: Cluster, findings: list[Finding]) -> tuple[Segment | None, Finding | str]:
+    def _next_clusters(self) -> list[tuple[Cluster, Segment]]:
+        """Take the next few clusters out of the game, each with its average; the paper takes one at a time."""
+        clusters: list[tuple[Cluster, Segment]] = []
+        while len(clusters) < (ROUND if self._removes else 1):
+            cluster = self._game.next_cluster()
+            if cluster is None:
+                break
+            average = average_cluster(self._players, cluster, self._config.averaging)
+            clusters.append((cluster, average))
+            if self._removes:
+                self._game.withdraw(self._game.explained_by(average, closely=True))
+        return clusters
+
+    def _try(
+        self, candidate: tuple[Cluster, Segment], known: tuple[Segment, ...]
+    ) -> tuple[Segment | None, Finding | str]:
         """Fit an average and judge it: the fitted segment, and the finding or the reason why it is none."""
+        cluster, average = candidate
+        if self._config.verification.enabled and is_contradicted(agreement(self._witnesses, average)):
+            return average, "agreement"
         fitted = self._fit(average)
         if isinstance(fitted, str):
             return None, fitted
-        if self._removes and any(is_part_of(fitted, finding.segment) for finding in findings):
+        if self._removes and any(is_part_of(fitted, segment) for segment in known):
             return fitted, "found before"
         return fitted, self._judge(fitted, len(cluster.members), cluster.payoff)
+
+    def _is_known(self, segment: Segment, findings: list[Finding]) -> bool:
+        return self._removes and any(is_part_of(segment, finding.segment) for finding in findings)
 
     def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""

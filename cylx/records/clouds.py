@@ -229,4 +229,8 @@ class Ground:
 
     def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
         """Tell which points may lie on a cylinder: those in flat windows of two radii belong to something flatter."""
-        return np.asarray(self.flatness[indices] < 2.0 * radius, dtype=np.bool_)
+        return np.asarray(self.flatness[indices] < self.too_flat(radius), dtype=np.bool_)
+
+    def too_flat(self, radius: float) -> float:
+        """Give the flatness from which a point belongs to something flatter than a cylinder of this radius."""
+        return 2.0 * radius

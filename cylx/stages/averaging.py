@@ -16,6 +16,7 @@ from cylx.config import AveragingConfig
 from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
+from cylx.geometry.extent import points_on, visible_extent
 from cylx.records import Candidates, Cluster, Ground, Segment
 
 FloatArray = NDArray[np.float64]
@@ -30,7 +31,6 @@ BEYOND = 1.02
 """A fit goes this much further than the ends: the outermost points lie on them, and rounding would choose."""
 LEAST_COSINE = math.cos(math.radians(25.0))
 """A fit whose axis turns further than this has left the candidates it came from."""
-ARC_BINS = 24
 
 
 def average_cluster(candidates: Candidates, cluster: Cluster, config: AveragingConfig) -> Segment:
@@ -102,9 +102,8 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         if not (0.5 * first[6] <= model[6] <= 2.0 * first[6]) or abs(model[3:6] @ first[3:6]) < LEAST_COSINE:
             return "drifted away"
         spread = TUKEY_SPREAD * spread
-        heights, distances, angles = cylinder_coordinates(points, model[:3], model[3:6])
-        on = np.abs(distances - model[6]) < 3.0 * min(max(spread, noise), 2.0 * noise)
-        found = visible_extent(heights[on], angles[on], half, model[6])
+        heights, angles = points_on(points, model, 3.0 * min(max(spread, noise), 2.0 * noise))
+        found = visible_extent(heights, angles, half, model[6])
         if found is None:
             return "too few points"
         low, high = found
@@ -192,61 +191,4 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
 
 def _own_points(ground: Ground, model: FloatArray, half: float, width: float, most: int | None) -> FloatArray:
     """Give the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
-    near = ground.cells.near_cylinder(model, -half, half, max(0.0, model[6] - width), model[6] + width)
-    near = near[:: max(1, len(near) // most)] if most else near
-    return ground.points[near[ground.may_be_on(near, model[6])]]
-
-
-def visible_extent(
-    heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float = 0.35
-) -> tuple[float, float] | None:
-    """Find how far a surface goes on, by pieces of its height in which its arc is filled.
-
-    Density alone would follow a can along the table it touches; what counts is the share of the arc's angles that are
-    filled.
-
-    Parameters
-    ----------
-    heights, angles : ndarray of shape (n,)
-        Cylinder coordinates of the points on the surface.
-    half : float
-        The arc is taken from the points with heights within this.
-    radius : float
-    filled : float
-        A piece belongs if it fills this share of what the median piece fills.
-
-    Returns
-    -------
-    low, high : float
-        Heights of the ends, None if fewer than 15 points are there.
-    """
-    core = np.abs(heights) <= half
-    if core.sum() < 15:
-        return None
-    bins = ((angles / (2 * np.pi) + 0.5) * ARC_BINS).astype(np.int64) % ARC_BINS
-    counts = np.bincount(bins[core], minlength=ARC_BINS)
-    arc = counts > max(0.5, 0.15 * float(np.median(counts[counts > 0])))
-    on = arc[bins]
-    density = float((core & on).sum()) / (2.0 * half)
-    if density <= 0.0:
-        return None
-    piece = max(0.25 * radius, 12.0 / density)
-    index = np.floor(heights[on] / piece).astype(np.int64)
-    first = int(index.min())
-    index -= first
-    pieces = int(index.max()) + 1
-    occupied = np.zeros((pieces, ARC_BINS), np.bool_)
-    occupied[index, bins[on]] = True
-    share = occupied.sum(axis=1) / arc.sum()
-    centers = (np.arange(pieces) + first + 0.5) * piece
-    inside = share[np.abs(centers) <= half + 0.5 * piece]
-    usual = float(np.median(inside[inside > 0])) if (inside > 0).any() else 1.0
-    good = np.flatnonzero(share >= filled * usual)
-    if len(good) == 0:
-        return None
-    gap = max(3.0 * radius, 12.0 / density) / piece
-    runs = np.split(good, np.flatnonzero(np.diff(good) > gap + 1) + 1)
-    overlaps = [min(centers[run[-1]] + 0.5 * piece, half) - max(centers[run[0]] - 0.5 * piece, -half) for run in runs]
-    best = runs[int(np.argmax(overlaps))]
-    own = heights[on][(index >= best[0]) & (index <= best[-1])]
-    return float(own.min()), float(own.max())
+    return ground.cells.surface_points(model, half, width, most, ground.flatness, ground.too_flat(model[6]))

@@ -10,6 +10,7 @@ import heapq
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import ClusteringConfig
@@ -40,9 +41,11 @@ class CandidateGame:
     ----------
     candidates : Candidates
     config : ClusteringConfig
+    threads : int
+        Does not change the result.
     """
 
-    def __init__(self, candidates: Candidates, config: ClusteringConfig) -> None:
+    def __init__(self, candidates: Candidates, config: ClusteringConfig, threads: int = 1) -> None:
         self._config = config
         self._candidates = candidates
         self._alive = np.ones(len(candidates), np.bool_)
@@ -61,6 +64,7 @@ class CandidateGame:
                 config.offset,
                 config.radius,
                 config.min_radius_ratio,
+                threads,
             )
         self._degrees = self._payoff.degrees()
         self._heap = [(-degree, i) for i, degree in enumerate(self._degrees.tolist())]
@@ -112,9 +116,12 @@ class CandidateGame:
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
         """Give the candidates still in the game that a cylinder accounts for, or that say closely the same."""
-        near, distance = _near(self._candidates, segment, 1.0)
-        limits = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
-        return np.flatnonzero(self._alive & near & _agree(self._candidates, segment, distance, *limits))
+        offset, angle, radius = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
+        found = np.empty(len(self._candidates), np.int64)
+        reach = segment.half + segment.model[6]
+        cosine = math.cos(math.radians(angle))
+        n = _pick_agreeing(self._candidates.models, self._alive, segment.model, reach, offset, cosine, radius, found)
+        return found[:n]
 
     def report(self) -> StageReport:
         """Count the candidates that came in, the clusters, and what was dropped."""
@@ -160,11 +167,12 @@ def agreement(windows: Candidates, segment: Segment) -> tuple[int, int]:
     -------
     consistent, near : int
     """
-    near, distance = _near(windows, segment, 0.0)
     seen = WITNESS * min(segment.model[6], 1.2 * segment.half)
-    near &= (distance < segment.model[6]) & (windows.windows > seen)
-    consistent = near & _agree(windows, segment, distance, 0.15, 6.0, 0.1)
-    return int(consistent.sum()), int(near.sum())
+    cosine = math.cos(math.radians(6.0))
+    consistent, near = _count_agreeing(
+        windows.models, windows.windows, segment.model, segment.half, seen, 0.15, cosine, 0.1
+    )
+    return int(consistent), int(near)
 
 
 def is_contradicted(counts: tuple[int, int]) -> bool:
@@ -176,26 +184,60 @@ def is_contradicted(counts: tuple[int, int]) -> bool:
     return near >= 12 and consistent + math.sqrt(max(consistent, 1.0)) < 0.2 * near
 
 
-def _near(candidates: Candidates, segment: Segment, margin: float) -> tuple[NDArray[np.bool_], FloatArray]:
-    """Tell which candidates lie along a cylinder's height and some radii more, and how far from its axis."""
-    offsets = candidates.points - segment.model[:3]
-    heights = offsets @ segment.model[3:6]
-    distance = np.linalg.norm(offsets - heights[:, None] * segment.model[3:6], axis=1)
-    return np.abs(heights) < segment.half + margin * segment.model[6], distance
+@njit(cache=True, nogil=True)
+def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cosine: float, radius: float) -> int:
+    """Tell of a candidate whether it lies within `reach` of a cylinder's middle (1), and whether it agrees, too (2).
+
+    Offset in the cylinder's radii, cosine of the angle, relative radius.
+    """
+    dx, dy, dz = row[0] - model[0], row[1] - model[1], row[2] - model[2]
+    height = dx * model[3] + dy * model[4] + dz * model[5]
+    square = dx * dx + dy * dy + dz * dz - height * height
+    if abs(height) >= reach or square >= model[6] * model[6]:
+        return 0
+    if square >= (offset * model[6]) ** 2 or abs(row[6] / model[6] - 1.0) >= radius:
+        return 1
+    turn = row[3] * model[3] + row[4] * model[4] + row[5] * model[5]
+    return 2 if abs(turn) > cosine else 1
 
 
-def _agree(
-    candidates: Candidates, segment: Segment, distance: FloatArray, offset: float, angle_deg: float, radius: float
-) -> NDArray[np.bool_]:
-    """Tell which candidates agree with a cylinder: offset in its radii, angle, relative radius."""
-    model = segment.model
-    cosine = np.abs(candidates.directions @ model[3:6])
-    return np.asarray(
-        (distance < offset * model[6])
-        & (np.abs(candidates.radii / model[6] - 1.0) < radius)
-        & (cosine > math.cos(math.radians(angle_deg))),
-        dtype=np.bool_,
-    )
+@njit(cache=True, nogil=True)
+def _count_agreeing(
+    models: FloatArray,
+    windows: FloatArray,
+    model: FloatArray,
+    reach: float,
+    seen: float,
+    offset: float,
+    cosine: float,
+    radius: float,
+) -> tuple[int, int]:
+    consistent, near = 0, 0
+    for i in range(len(models)):
+        if windows[i] > seen:
+            level = _agrees(models[i], model, reach, offset, cosine, radius)
+            near += 1 if level > 0 else 0
+            consistent += 1 if level > 1 else 0
+    return consistent, near
+
+
+@njit(cache=True, nogil=True)
+def _pick_agreeing(
+    models: FloatArray,
+    alive: NDArray[np.bool_],
+    model: FloatArray,
+    reach: float,
+    offset: float,
+    cosine: float,
+    radius: float,
+    found: IndexArray,
+) -> int:
+    n = 0
+    for i in range(len(models)):
+        if alive[i] and _agrees(models[i], model, reach, offset, cosine, radius) > 1:
+            found[n] = i
+            n += 1
+    return n
 
 
 def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:

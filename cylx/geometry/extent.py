@@ -1,0 +1,238 @@
+"""How far the surface of a cylinder goes on along its axis."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.geometry.small_matrices import fill_frame
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+ARC_BINS = 24
+LEAST = 15
+"""Points without which an extent cannot be told."""
+FULL_PIECE = 12.0
+"""Points a piece of the height should hold."""
+LONE = 6.0
+"""An outermost point is a stray if the third of the points from the end lies more than this many usual gaps further in;
+of even points one in sixty looks so."""
+
+
+def visible_extent(
+    heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float = 0.35
+) -> tuple[float, float] | None:
+    """Find how far a surface goes on, by pieces of its height in which its arc is filled.
+
+    Density alone would follow a can along the table it touches; what counts is the share of the arc's angles that are
+    filled.
+
+    Parameters
+    ----------
+    heights, angles : ndarray of shape (n,)
+        Cylinder coordinates of the points on the surface.
+    half : float
+        The arc is taken from the points with heights within this.
+    radius : float
+    filled : float
+        A piece belongs if it fills this share of what the median piece fills.
+
+    Returns
+    -------
+    low, high : float
+        Heights of the ends, None if fewer than 15 points are there.
+    """
+    ends = np.empty(2)
+    found = _find_ends(np.ascontiguousarray(heights), np.ascontiguousarray(angles), half, radius, filled, ends)
+    return (float(ends[0]), float(ends[1])) if found else None
+
+
+def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
+    """Give heights and angles of the points within `width` of a cylinder's surface.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+    model : ndarray of shape (7,)
+        A point of the axis, where heights are zero, its unit direction, the radius.
+    width : float
+
+    Returns
+    -------
+    heights, angles : ndarray of shape (n,)
+    """
+    heights, residuals, angles = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
+    n = fill_coordinates(points, model, width, heights, residuals, angles)
+    return heights[:n], angles[:n]
+
+
+@njit(cache=True, nogil=True)
+def fill_coordinates(
+    points: FloatArray, model: FloatArray, width: float, heights: FloatArray, residuals: FloatArray, angles: FloatArray
+) -> int:
+    """Fill in height, signed distance to the surface, and angle of the points within `width` of it; count them."""
+    frame = np.empty((2, 3))
+    fill_frame(model[3:6], frame)
+    n = 0
+    for i in range(len(points)):
+        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        residual = math.sqrt(x * x + y * y) - model[6]
+        if abs(residual) < width:
+            heights[n] = dx * model[3] + dy * model[4] + dz * model[5]
+            residuals[n], angles[n] = residual, math.atan2(y, x)
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def sort_in_place(values: FloatArray, n: int) -> None:
+    """Sort values[:n], ascending: Shell's method with Ciura's gaps, quick to compile."""
+    gap = 1
+    while gap < n // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, n):
+            value, j = values[i], i
+            while j >= gap and values[j - gap] > value:
+                values[j] = values[j - gap]
+                j -= gap
+            values[j] = value
+        gap //= 3
+
+
+@njit(cache=True, nogil=True)
+def _median_of_positive(values: FloatArray, n: int, scratch: FloatArray) -> float:
+    """Give the median of those of values[:n] that are positive; 0 if there are none."""
+    m = 0
+    for i in range(n):
+        if values[i] > 0.0:
+            scratch[m] = values[i]
+            m += 1
+    if m == 0:
+        return 0.0
+    sort_in_place(scratch, m)
+    return float(0.5 * (scratch[(m - 1) // 2] + scratch[m // 2]))
+
+
+@njit(cache=True, nogil=True)
+def _find_ends(
+    heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float, ends: FloatArray
+) -> bool:
+    counts, scratch = np.zeros(ARC_BINS), np.empty(ARC_BINS)
+    arc = np.zeros(ARC_BINS, np.bool_)
+    core, lowest, highest = 0, math.inf, -math.inf
+    for i in range(len(heights)):
+        if abs(heights[i]) <= half:
+            counts[_bin(angles[i])] += 1.0
+            core += 1
+    if core < LEAST:
+        return False
+    least = max(0.5, 0.15 * _median_of_positive(counts, ARC_BINS, scratch))
+    width, on = 0, 0.0
+    for b in range(ARC_BINS):
+        if counts[b] > least:
+            arc[b] = True
+            width += 1
+            on += counts[b]
+    density = on / (2.0 * half)
+    if density <= 0.0:
+        return False
+    for i in range(len(heights)):
+        if arc[_bin(angles[i])]:
+            lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
+    piece = max(0.25 * radius, FULL_PIECE / density)
+    first = math.floor(lowest / piece)
+    pieces = int(math.floor(highest / piece) - first) + 1
+    shares = _fill_shares(heights, angles, arc, width, piece, first, pieces)
+    start, stop = _choose_run(shares, pieces, piece, first, half, filled, max(3.0 * radius, FULL_PIECE / density))
+    if start < 0:
+        return False
+    _set_ends(heights, angles, arc, (first + start) * piece, (first + stop + 1) * piece, 2.0 * piece, ends)
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _bin(angle: float) -> int:
+    return int((angle / (2.0 * math.pi) + 0.5) * ARC_BINS) % ARC_BINS
+
+
+@njit(cache=True, nogil=True)
+def _fill_shares(
+    heights: FloatArray, angles: FloatArray, arc: NDArray[np.bool_], width: int, piece: float, first: float, pieces: int
+) -> FloatArray:
+    """Give the share of the arc's bins that hold a point, for each piece of the height."""
+    occupied = np.zeros((pieces, ARC_BINS), np.bool_)
+    shares = np.zeros(pieces)
+    for i in range(len(heights)):
+        b = _bin(angles[i])
+        if arc[b]:
+            p = int(math.floor(heights[i] / piece) - first)
+            if not occupied[p, b]:
+                occupied[p, b] = True
+                shares[p] += 1.0 / width
+    return shares
+
+
+@njit(cache=True, nogil=True)
+def _choose_run(
+    shares: FloatArray, pieces: int, piece: float, first: float, half: float, filled: float, bridge: float
+) -> tuple[int, int]:
+    """Give first and last piece of the run of filled ones that overlaps the known height most; gaps are bridged."""
+    inside, scratch, n = np.empty(pieces), np.empty(pieces), 0
+    for p in range(pieces):
+        if abs((first + p + 0.5) * piece) <= half + 0.5 * piece:
+            inside[n] = shares[p]
+            n += 1
+    usual = _median_of_positive(inside, n, scratch)
+    if usual == 0.0:
+        usual = 1.0
+    best, start, stop, last, most = -1, -1, -1, -1, -math.inf
+    for p in range(pieces + 1):
+        if p < pieces and shares[p] < filled * usual:
+            continue
+        if start >= 0 and (p == pieces or p - last > bridge / piece + 1.0):
+            overlap = min((first + last + 1) * piece, half) - max((first + start) * piece, -half)
+            if overlap > most:
+                best, stop, most = start, last, overlap
+            start = -1
+        if p < pieces:
+            start = p if start < 0 else start
+            last = p
+    return best, stop
+
+
+@njit(cache=True, nogil=True)
+def _set_ends(
+    heights: FloatArray,
+    angles: FloatArray,
+    arc: NDArray[np.bool_],
+    low: float,
+    high: float,
+    margin: float,
+    ends: FloatArray,
+) -> None:
+    """Set the ends to the outermost points between two heights that are not strays."""
+    near, count = np.empty(len(heights)), 0
+    for i in range(len(heights)):
+        if low <= heights[i] < high and arc[_bin(angles[i])]:
+            count += 1
+    gap = (high - low) / max(count, 1)
+    for side in range(2):
+        n = 0
+        for i in range(len(heights)):
+            depth = heights[i] - low if side == 0 else high - heights[i]
+            if 0.0 <= depth < margin and low <= heights[i] < high and arc[_bin(angles[i])]:
+                near[n] = depth
+                n += 1
+        sort_in_place(near, n)
+        end = 0
+        while end + 2 < n and near[end + 2] - near[end] > LONE * gap:
+            end += 1
+        depth = near[end] if n > 0 else 0.0
+        ends[side] = low + depth if side == 0 else high - depth
