@@ -7,11 +7,14 @@ from dataclasses import replace
 
 from cylx.config import Config
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, Cluster, Finding, Ground, Segment
+from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame, agreement, is_contradicted
 from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
+
+FOUND_BEFORE = "found before"
+"""The reason of a segment that is one of those accepted already; it is no other cylinder."""
 
 
 class Turns:
@@ -30,6 +33,11 @@ class Turns:
         Least and greatest radius, frame units; they hold for the fitted cylinders, too.
     config : Config
         Resolved.
+
+    Attributes
+    ----------
+    refused : list of Refusal
+        What was not accepted so far, but for what had been found before.
     """
 
     def __init__(
@@ -47,6 +55,7 @@ class Turns:
         self._ground = ground
         self._radii = radii
         self._config = config
+        self.refused: list[Refusal] = []
         # the paper takes no more than the winners out of the game (section 3.5)
         self._removes = config.clustering.population == "local"
 
@@ -57,15 +66,16 @@ class Turns:
         while (cluster := self._game.next_cluster()) is not None:
             segment = average_cluster(self._players, cluster, self._config.averaging)
             fitted: Segment | None
-            found: Finding | str
+            found: Finding | Refusal
             if self._config.verification.enabled and is_contradicted(agreement(self._witnesses, segment)):
-                fitted, found = segment, "agreement"
+                fitted, found = segment, Refusal(segment, "agreement", len(cluster.members), cluster.payoff)
             else:
                 fitted, found = self._try(segment, cluster, findings)
             if isinstance(found, Finding):
                 findings.append(found)
             else:
-                rejected[found] += 1
+                rejected[found.reason] += 1
+                self.refused += [found] if found.reason != FOUND_BEFORE else []
             if self._removes and fitted is not None:
                 # what the like of a refused segment would lead to is known, too
                 closely = not isinstance(found, Finding)
@@ -77,14 +87,17 @@ class Turns:
         journal.report("verification", len(findings) + rejected.total(), len(findings), rejected)
         return findings
 
-    def _try(self, average: Segment, cluster: Cluster, findings: list[Finding]) -> tuple[Segment | None, Finding | str]:
-        """Fit an average and judge it: the fitted segment, and the finding or the reason why it is none."""
+    def _try(
+        self, average: Segment, cluster: Cluster, findings: list[Finding]
+    ) -> tuple[Segment | None, Finding | Refusal]:
+        """Fit an average and judge it: the fitted segment, and the finding or why it is none."""
+        support, payoff = len(cluster.members), cluster.payoff
         fitted = self._fit(average)
         if isinstance(fitted, str):
-            return None, fitted
+            return None, Refusal(average, fitted, support, payoff)
         if self._removes and any(is_part_of(fitted, finding.segment) for finding in findings):
-            return fitted, "found before"
-        return fitted, self._judge(fitted, len(cluster.members), cluster.payoff)
+            return fitted, Refusal(fitted, FOUND_BEFORE, support, payoff)
+        return fitted, self._judge(fitted, support, payoff)
 
     def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
@@ -94,6 +107,9 @@ class Turns:
             distinct = drop_claimed(findings, len(self._ground.points))
             pieces = merge_pieces(distinct, self._ground, self._join)
             kept = drop_claimed(pieces, len(self._ground.points))
+            for before, after in ((findings, distinct), (pieces, kept)):
+                there = {id(finding) for finding in after}
+                self.refused += [Refusal.of(one, "claimed by a better one") for one in before if id(one) not in there]
             joined = len(distinct) - len(pieces)
             claimed = len(findings) - joined - len(kept)
         if self._config.averaging.refine:
@@ -101,6 +117,7 @@ class Turns:
         kept = sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))
         beyond = kept[self._config.max_cylinders :] if self._config.max_cylinders else []
         kept = kept[: len(kept) - len(beyond)]
+        self.refused += [Refusal.of(finding, "beyond max_cylinders") for finding in beyond]
         rejected = {"joined": joined, "claimed by a better one": claimed, "beyond max_cylinders": len(beyond)}
         journal.report("merging", len(findings), len(kept), rejected)
         return kept
@@ -124,14 +141,15 @@ class Turns:
         found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
         return found if isinstance(found, Finding) else None
 
-    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | str:
-        """Verify a segment; the first test it failed if it does not pass."""
+    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | Refusal:
+        """Verify a segment; what speaks most against it if it does not pass."""
         if not self._radii[0] <= segment.model[6] <= self._radii[1]:
-            return "radius out of range"
+            return Refusal(segment, "radius out of range", support, payoff)
         share = agreement(self._witnesses, segment)
         verdict = verify(segment, self._ground, payoff, share, self._config.verification)
         if not verdict.measures or (self._config.verification.enabled and verdict.reason):
-            return verdict.reason
+            confidence = verdict.confidence if verdict.measures else None
+            return Refusal(segment, verdict.reason, support, payoff, confidence, verdict.coverage, verdict.measures)
         return Finding(
             segment,
             verdict.points,
