@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from cylx.records import CylinderFit as CylinderFit
     from cylx.records import Extraction as Extraction
     from cylx.records import PointCloud as PointCloud
+    from cylx.records import Rejection as Rejection
     from cylx.results import Result as Result
 
 _HOMES = {
@@ -32,6 +33,7 @@ _HOMES = {
     "CylxError": "cylx.errors",
     "Extraction": "cylx.records",
     "PointCloud": "cylx.records",
+    "Rejection": "cylx.records",
     "Result": "cylx.results",
     "compare": "cylx.evaluation",
     "evaluate": "cylx.evaluation",

@@ -87,7 +87,7 @@ def local_payoff(
     """
     least_ratio = max(min_ratio, 1.0 + math.log(CUT) * radius)
     # by bins of the radius, of which only neighbours can be compatible, and along x within a bin
-    bins = np.floor(np.log(models[:, 6]) / -math.log(least_ratio)).astype(np.int64) if len(models) else np.empty(0)
+    bins = np.floor(np.log(models[:, 6]) / -math.log(least_ratio)).astype(np.int64)
     order = np.lexsort((models[:, 0], bins)).astype(np.int64)
     sorted_models = np.ascontiguousarray(models[order])
     extents = extents[order]
@@ -100,10 +100,14 @@ def local_payoff(
         for b in range(len(bins))
         for first in range(int(starts[b]), int(starts[b + 1]), PIECE)
     ]
+
+    def work(piece: tuple[int, int, int]) -> tuple[IndexArray, IndexArray, FloatArray]:
+        return _pairs(*table, *piece, least_ratio, (angle, offset, radius))  # type: ignore[call-arg,no-any-return]
+
     with ThreadPoolExecutor(threads) as pool:
-        found = list(pool.map(lambda piece: _pairs(*table, *piece, least_ratio, (angle, offset, radius)), pieces))
+        found = list(pool.map(work, pieces))
     counts = np.zeros(len(models) + 1, np.int64)
-    for rows, columns, values in found:
+    for rows, columns, _ in found:
         _count(rows, columns, counts[1:])
     pointers = np.cumsum(counts)
     indices, payoffs, ends = np.empty(pointers[-1], np.int64), np.empty(pointers[-1]), pointers[:-1].copy()

@@ -8,9 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from cylx.config import AveragingConfig, Config
 from cylx.geometry.cells import Cells
+from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, Ground, Noise, Segment
 from cylx.scene import make_frame
-from cylx.geometry.extent import visible_extent
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.synthetic import single
 

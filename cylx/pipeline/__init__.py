@@ -69,4 +69,4 @@ def extract_cylinders(
     with journal.stage("merging"):
         findings = turns.merge(findings, journal)
     with journal.stage("labelling"):
-        return conclude(cloud, frame, scene, ground, findings, journal.reports, config)
+        return conclude(cloud, frame, scene, ground, findings, turns.refused, journal.reports, config)

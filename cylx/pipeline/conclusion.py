@@ -5,8 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from cylx.config import Config
-from cylx.records import CylinderFit, Extraction, Finding, Frame, Ground, PointCloud, Scene, StageReport
-from cylx.stages.labelling import label_points
+from cylx.records import (
+    CylinderFit,
+    Extraction,
+    Finding,
+    Frame,
+    Ground,
+    PointCloud,
+    Refusal,
+    Rejection,
+    Scene,
+    StageReport,
+)
+from cylx.stages.labelling import label_points, surface_points
+from cylx.stages.verification import covered_angle
 
 
 def conclude(
@@ -15,6 +27,7 @@ def conclude(
     scene: Scene,
     ground: Ground,
     findings: list[Finding],
+    refused: list[Refusal],
     reports: list[StageReport],
     config: Config,
 ) -> Extraction:
@@ -27,6 +40,8 @@ def conclude(
     scene : Scene
     ground : Ground
     findings : list of Finding
+    refused : list of Refusal
+        What was not accepted, in the order it came.
     reports : list of StageReport
     config : Config
         Resolved.
@@ -59,7 +74,32 @@ def conclude(
     in_cloud = np.empty(len(labels), np.int32), np.empty(len(labels), np.float32)
     in_cloud[0][frame.order] = number[labels]
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
-    return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, tuple(_warnings(scene, fits)))
+    warnings = tuple(_warnings(scene, fits))
+    lost = [Refusal.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
+    rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified))
+    return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
+
+
+def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verified: bool) -> list[Rejection]:
+    """Put what was refused into scene units, the most trusted first; what has no shape at all is left out."""
+    out = []
+    for refusal in refused:
+        segment = refusal.segment
+        if not (np.isfinite(segment.model).all() and segment.model[6] > 0.0 and segment.half >= 0.0):
+            continue
+        _, residuals, angles = surface_points(segment, ground)
+        fit = CylinderFit(
+            frame.to_scene(segment.cylinder),
+            len(residuals),
+            float(np.sqrt((residuals**2).sum() / max(len(residuals), 1))) * frame.spacing,
+            refusal.coverage if refusal.measures else covered_angle(angles)[0],
+            refusal.support,
+            refusal.payoff,
+            refusal.confidence if verified else None,
+            refusal.measures,
+        )
+        out.append(Rejection(fit, refusal.reason))
+    return sorted(out, key=lambda one: (one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers))
 
 
 def _warnings(scene: Scene, fits: list[CylinderFit]) -> list[str]:

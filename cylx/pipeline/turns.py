@@ -9,11 +9,14 @@ from itertools import repeat
 
 from cylx.config import Config
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, Cluster, Finding, Ground, Segment
+from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame, agreement, is_contradicted
 from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
+
+FOUND_BEFORE = "found before"
+"""The reason of a segment that is one of those accepted already; it is no other cylinder."""
 
 
 ROUND = 16
@@ -38,6 +41,11 @@ class Turns:
         Resolved.
     threads : int
         Does not change the result.
+
+    Attributes
+    ----------
+    refused : list of Refusal
+        What was not accepted so far, but for what had been found before.
     """
 
     def __init__(
@@ -57,6 +65,7 @@ class Turns:
         self._radii = radii
         self._config = config
         self._threads = threads
+        self.refused: list[Refusal] = []
         # the paper takes no more than the winners out of the game (section 3.5)
         self._removes = config.clustering.population == "local"
 
@@ -66,19 +75,18 @@ class Turns:
         rejected: Counter[str] = Counter()
         with ThreadPoolExecutor(self._threads) as pool:
             while clusters := self._next_clusters():
-                averages = [average for _, average in clusters]
-                fits = pool.map(self._try, clusters, repeat(tuple(finding.segment for finding in findings)))
-                for average, (fitted, found) in zip(averages, list(fits), strict=True):
-                    if isinstance(found, Finding) and self._is_known(found.segment, findings):
-                        found = "found before"  # by another of these clusters
+                known = tuple(finding.segment for finding in findings)
+                for outcome in list(pool.map(self._try, clusters, repeat(known))):
+                    found = self._new_or_known(outcome, findings)
                     if isinstance(found, Finding):
                         findings.append(found)
                     else:
-                        rejected[found] += 1
+                        rejected[found.reason] += 1
+                        self.refused += [found] if found.reason != FOUND_BEFORE else []
                     if self._removes:
                         # what the like of a refused segment would lead to is known, too
                         closely = not isinstance(found, Finding)
-                        self._game.withdraw(self._game.explained_by(fitted or average, closely=closely))
+                        self._game.withdraw(self._game.explained_by(found.segment, closely=closely))
                     journal.advance()
                 if self._enough(findings):
                     break
@@ -99,22 +107,25 @@ class Turns:
                 self._game.withdraw(self._game.explained_by(average, closely=True))
         return clusters
 
-    def _try(
-        self, candidate: tuple[Cluster, Segment], known: tuple[Segment, ...]
-    ) -> tuple[Segment | None, Finding | str]:
-        """Fit an average and judge it: the fitted segment, and the finding or the reason why it is none."""
+    def _try(self, candidate: tuple[Cluster, Segment], known: tuple[Segment, ...]) -> Finding | Refusal:
+        """Fit an average and judge it: the finding, or why it is none."""
         cluster, average = candidate
+        support, payoff = len(cluster.members), cluster.payoff
         if self._config.verification.enabled and is_contradicted(agreement(self._witnesses, average)):
-            return average, "agreement"
+            return Refusal(average, "agreement", support, payoff)
         fitted = self._fit(average)
         if isinstance(fitted, str):
-            return None, fitted
+            return Refusal(average, fitted, support, payoff)
         if self._removes and any(is_part_of(fitted, segment) for segment in known):
-            return fitted, "found before"
-        return fitted, self._judge(fitted, len(cluster.members), cluster.payoff)
+            return Refusal(fitted, FOUND_BEFORE, support, payoff)
+        return self._judge(fitted, support, payoff)
 
-    def _is_known(self, segment: Segment, findings: list[Finding]) -> bool:
-        return self._removes and any(is_part_of(segment, finding.segment) for finding in findings)
+    def _new_or_known(self, found: Finding | Refusal, findings: list[Finding]) -> Finding | Refusal:
+        """Refuse a finding that another cluster of the same round has led to before."""
+        if not (self._removes and isinstance(found, Finding)):
+            return found
+        known = any(is_part_of(found.segment, finding.segment) for finding in findings)
+        return Refusal.of(found, FOUND_BEFORE) if known else found
 
     def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
@@ -124,6 +135,9 @@ class Turns:
             distinct = drop_claimed(findings, len(self._ground.points))
             pieces = merge_pieces(distinct, self._ground, self._join)
             kept = drop_claimed(pieces, len(self._ground.points))
+            for before, after in ((findings, distinct), (pieces, kept)):
+                there = {id(finding) for finding in after}
+                self.refused += [Refusal.of(one, "claimed by a better one") for one in before if id(one) not in there]
             joined = len(distinct) - len(pieces)
             claimed = len(findings) - joined - len(kept)
         if self._config.averaging.refine:
@@ -131,6 +145,7 @@ class Turns:
         kept = sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))
         beyond = kept[self._config.max_cylinders :] if self._config.max_cylinders else []
         kept = kept[: len(kept) - len(beyond)]
+        self.refused += [Refusal.of(finding, "beyond max_cylinders") for finding in beyond]
         rejected = {"joined": joined, "claimed by a better one": claimed, "beyond max_cylinders": len(beyond)}
         journal.report("merging", len(findings), len(kept), rejected)
         return kept
@@ -154,14 +169,15 @@ class Turns:
         found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
         return found if isinstance(found, Finding) else None
 
-    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | str:
-        """Verify a segment; the first test it failed if it does not pass."""
+    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | Refusal:
+        """Verify a segment; what speaks most against it if it does not pass."""
         if not self._radii[0] <= segment.model[6] <= self._radii[1]:
-            return "radius out of range"
+            return Refusal(segment, "radius out of range", support, payoff)
         share = agreement(self._witnesses, segment)
         verdict = verify(segment, self._ground, payoff, share, self._config.verification)
         if not verdict.measures or (self._config.verification.enabled and verdict.reason):
-            return verdict.reason
+            confidence = verdict.confidence if verdict.measures else None
+            return Refusal(segment, verdict.reason, support, payoff, confidence, verdict.coverage, verdict.measures)
         return Finding(
             segment,
             verdict.points,

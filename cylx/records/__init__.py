@@ -6,7 +6,7 @@ one. All records are frozen: a stage makes new ones and never changes those it w
 
 from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source
 from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
-from cylx.records.outcomes import CylinderFit, Extraction, Finding, Segment
+from cylx.records.outcomes import CylinderFit, Extraction, Finding, Refusal, Rejection, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
 
 __all__ = [
@@ -21,6 +21,8 @@ __all__ = [
     "Noise",
     "Observer",
     "PointCloud",
+    "Refusal",
+    "Rejection",
     "Scene",
     "Segment",
     "SilentObserver",

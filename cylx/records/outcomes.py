@@ -79,6 +79,43 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Refusal:
+    """A segment that was not accepted, in the frame of the cloud.
+
+    Parameters
+    ----------
+    segment : Segment
+        Fitted, or the average of its candidates if it did not come to a fit.
+    reason : str
+        The term of the evidence that speaks most against it, or the limit it does not keep.
+    support : int
+        Candidates of its cluster.
+    payoff : float
+        Mean payoff of its cluster.
+    confidence : float or None
+        Probability that it is a cylinder; None if it was refused before anything was measured.
+    coverage : float
+        Angle about the axis that is covered, radians; 0 if it was not measured.
+    measures : mapping of str to float
+        What the verification measured.
+    """
+
+    segment: Segment
+    reason: str
+    support: int
+    payoff: float
+    confidence: float | None = None
+    coverage: float = 0.0
+    measures: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, finding: Finding, reason: str) -> Refusal:
+        """Take back a finding."""
+        confidence, coverage = finding.confidence, finding.coverage
+        return cls(finding.segment, reason, finding.support, finding.payoff, confidence, coverage, finding.measures)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CylinderFit:
     """A cylinder and the evidence for it.
 
@@ -113,6 +150,23 @@ class CylinderFit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Rejection:
+    """What was taken for a cylinder and not accepted.
+
+    Parameters
+    ----------
+    fit : CylinderFit
+        Its shape and the evidence. Its inliers are the points on its surface, whatever their label; what was refused
+        before it was measured has no confidence and no evidence.
+    reason : str
+        The term of the evidence that speaks most against it, or the limit it does not keep.
+    """
+
+    fit: CylinderFit
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Extraction:
     """All that one run found out about one cloud.
 
@@ -135,6 +189,9 @@ class Extraction:
         The resolved configuration: nothing in it is None that the run depended on.
     warnings : tuple of str
         What a user should know before trusting the answer.
+    rejected : tuple of Rejection
+        What was not accepted, ordered by confidence, then inliers, descending; what was not measured comes last. The
+        like of one refused segment may be in it more than once.
     """
 
     cylinders: tuple[CylinderFit, ...]
@@ -145,3 +202,4 @@ class Extraction:
     stages: tuple[StageReport, ...]
     config: Config
     warnings: tuple[str, ...] = ()
+    rejected: tuple[Rejection, ...] = ()

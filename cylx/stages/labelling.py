@@ -9,6 +9,7 @@ from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.records import Ground, Segment
 
 FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
 
 
 def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.int32], FloatArray]:
@@ -31,15 +32,34 @@ def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.in
     residuals = np.full(len(ground.points), np.nan)
     nearest = np.full(len(ground.points), np.inf)
     for index, segment in enumerate(segments):
-        radius = segment.model[6]
-        reach = 3.0 * max(segment.spread, ground.noise_about(radius))
-        near = ground.cells.near_cylinder(
-            segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
-        )
-        near = near[ground.may_be_on(near, radius)]
-        _, distances, _ = cylinder_coordinates(ground.points[near], segment.model[:3], segment.model[3:6])
-        offset = distances - radius
+        near, offset, _ = surface_points(segment, ground)
         closer = np.abs(offset) < nearest[near]
         near, offset = near[closer], offset[closer]
         labels[near], residuals[near], nearest[near] = index, offset, np.abs(offset)
     return labels, residuals
+
+
+def surface_points(segment: Segment, ground: Ground) -> tuple[IndexArray, FloatArray, FloatArray]:
+    """Give the points within three deviations of a segment's surface that may belong to it.
+
+    Parameters
+    ----------
+    segment : Segment
+    ground : Ground
+
+    Returns
+    -------
+    indices : ndarray of shape (n,)
+    residuals : ndarray of shape (n,)
+        Signed distances to the surface, + is outside.
+    angles : ndarray of shape (n,)
+        About the axis, in (-pi, pi].
+    """
+    radius = segment.model[6]
+    reach = 3.0 * max(segment.spread, ground.noise_about(radius))
+    near = ground.cells.near_cylinder(
+        segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
+    )
+    near = near[ground.may_be_on(near, radius)]
+    _, distances, angles = cylinder_coordinates(ground.points[near], segment.model[:3], segment.model[3:6])
+    return near, distances - radius, angles
