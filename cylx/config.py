@@ -47,12 +47,16 @@ class SceneConfig(Section):
 
 
 class SlicingConfig(Section):
-    """Planes through the whole cloud, and the points close to them."""
+    """Planes through the whole cloud and through windows of every scale, and the points close to them."""
 
     planes: Annotated[int, Field(ge=0)] = 40
     """Number of random planes N. More planes find more cylinders and take longer."""
+    local_planes: Annotated[int, Field(ge=0)] = 3
+    """Planes through each window, besides one across its longest direction; 0 leaves the windows out."""
+    windows: Annotated[int, Field(ge=1)] = 400
+    """Most windows of one scale, where nothing else explains the points. More windows find more thin, sparse pipes."""
     thickness: Positive | None = None
-    """Full thickness of a slice, scene units. Thicker slices hold more points and smear the ellipse."""
+    """Full thickness of a slice through the whole cloud, scene units. Thicker slices hold more points and smear the ellipse."""
     min_points: Annotated[int, Field(ge=6)] = 20
     """A slice, or a piece of one, with fewer points is dropped."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,15 +20,34 @@ NEIGHBOURS = (48, 96, 192)
 """Sizes of a neighbourhood: the next is taken where the patch is not wide against its thickness."""
 WIDE = 4.0
 """A patch is wide if its in-plane rms exceeds its thickness this many times."""
+FLAT = 8.0
+"""A patch says something of the noise of its place if it is wide this many times: what is thicker may be no surface."""
+AGREED = 16
+"""Patches that a cell needs to say something of its own noise."""
 PIECES, PATCH = 600, 64
 """Larger pieces looked at, and the points of each."""
 MAD_SHRINKAGE = 0.93
 """What the median absolute deviation of 48 quadric residuals shows of a Gaussian's standard deviation, as a share."""
 
 
+class Patches(NamedTuple):
+    """Small pieces of surface.
+
+    Parameters
+    ----------
+    middles : ndarray of shape (m,)
+        Index of the point each was taken about.
+    deviations : ndarray of shape (m,)
+        Standard deviations about their quadrics.
+    """
+
+    middles: IndexArray
+    deviations: FloatArray
+
+
 def measure_surface(
     points: FloatArray, codes: IndexArray, unit: float, rng: np.random.Generator
-) -> tuple[float, float, float]:
+) -> tuple[float, float, float, Patches]:
     """Measure how far apart the points of a cloud lie and how far they scatter about their surfaces.
 
     Parameters
@@ -43,6 +63,8 @@ def measure_surface(
     -------
     spacing, dense, noise : float
         Median spacing, spacing of the densest tenth, standard deviation about the surface.
+    patches : Patches
+        Where what was measured.
     """
     sample = np.sort(rng.choice(len(points), min(SAMPLE, len(points)), replace=False))
     level = 0
@@ -52,6 +74,7 @@ def measure_surface(
     spread = np.full(len(sample), np.nan)
     deviation = np.full(len(sample), np.nan)
     spacing = np.full(len(sample), np.nan)
+    flat = np.zeros(len(sample), np.bool_)
     for count in NEIGHBOURS:
         todo = np.flatnonzero(np.isnan(spread))
         size = min(count, len(points) - 1)
@@ -63,6 +86,7 @@ def measure_surface(
         sd, width = quadric_spread(points[near])
         wide = width > WIDE * sd
         spread[todo[wide]] = sd[wide]
+        flat[todo[wide]] = width[wide] > FLAT * sd[wide]
         third = np.flatnonzero(wide)[::3] if wide.any() else np.arange(0, len(todo), 3)
         deviation[todo[third]] = _core_spread(points[near[third]])
         fresh = np.isnan(spacing[todo])
@@ -70,16 +94,62 @@ def measure_surface(
     known = np.isfinite(spacing) & (spacing > 0)
     if not known.any():  # a handful of points: their extent is all there is to go by
         guess = float(np.linalg.norm(np.ptp(points, axis=0))) / math.sqrt(len(points))
-        return guess, guess, 0.1 * guess
+        return guess, guess, 0.1 * guess, Patches(np.empty(0, np.int64), np.empty(0))
     typical, dense = np.quantile(spacing[known], [0.5, 0.1])
     good = np.isfinite(spread) & (spread > 1e-9 * typical)
+    clear = good & flat
     cores = deviation[np.isfinite(deviation)]
     noise = 1e-3 * typical  # noise-free surfaces still have a scale below which nothing is told apart
     if good.any():
         plain, robust = half_sample_mode(spread[good]), half_sample_mode(cores + 1e-12 * typical)
         # heavy outliers blow up the plain estimate alone
         noise = max(noise, robust / MAD_SHRINKAGE if robust < 0.85 * MAD_SHRINKAGE * plain else plain)
-    return float(typical), float(dense), float(noise)
+    return float(typical), float(dense), float(noise), Patches(sample[clear], spread[clear])
+
+
+def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tuple[float, IndexArray, FloatArray]:
+    """Measure where the noise exceeds the usual one: in cells that hold enough patches most of which agree.
+
+    Parameters
+    ----------
+    places : ndarray of shape (m, 3)
+        Of patches, from zero.
+    ratios : ndarray of shape (m,)
+        Standard deviations of the patches over the usual one.
+    extent : float
+        Side of the cube that holds the cloud.
+
+    Returns
+    -------
+    side : float
+        Of the cells.
+    cells : ndarray of shape (C, 3), int64
+        Those of which something is known; none if it is the same everywhere.
+    factors : ndarray of shape (C,)
+        How many times the usual noise there is.
+    """
+    none = np.empty((0, 3), np.int64), np.empty(0)
+    side = 1.01 * extent
+    while len(places) >= AGREED:
+        corner = np.floor(places / (0.5 * side)).astype(np.int64)
+        cells, owner = np.unique(corner, axis=0, return_inverse=True)
+        if len(places) < 2 * AGREED * len(cells):
+            break
+        side *= 0.5
+    corner = np.floor(places / side).astype(np.int64)
+    cells, owner = np.unique(corner, axis=0, return_inverse=True)
+    factors, known = np.ones(len(cells)), np.zeros(len(cells), np.bool_)
+    for c in range(len(cells)):
+        own = ratios[owner.ravel() == c]
+        if len(own) < AGREED:
+            continue
+        mode = half_sample_mode(own)
+        known[c] = (np.abs(np.log(own / mode)) < 0.3).mean() >= 0.6
+        # what is less may be the scatter of the estimate; and a quiet floor says nothing of what stands on it
+        factors[c] = mode if known[c] and mode > 1.3 else 1.0
+    if not (factors != 1.0).any():
+        return side, *none
+    return side, cells[known], factors[known]
 
 
 def noise_by_size(

@@ -102,7 +102,7 @@ def local_payoff(
     ]
 
     def work(piece: tuple[int, int, int]) -> tuple[IndexArray, IndexArray, FloatArray]:
-        return _pairs(*table, *piece, least_ratio, (angle, offset, radius))  # type: ignore[call-arg,no-any-return]
+        return _pairs(*table, *piece, least_ratio, (angle, offset, radius))
 
     with ThreadPoolExecutor(threads) as pool:
         found = list(pool.map(work, pieces))

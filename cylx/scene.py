@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.errors import InputError
 from cylx.geometry.morton import BITS, morton_codes
-from cylx.noise import measure_surface, noise_by_size
-from cylx.records import Frame, Noise, Scene
+from cylx.noise import measure_surface, noise_by_place, noise_by_size
+from cylx.records import Frame, Noise, Scene, cell_keys
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -39,14 +40,15 @@ def check_usable(points: FloatArray, place: str) -> None:
     if len(points) < 5:
         raise InputError(place, f"only {len(points)} usable point{'s' if len(points) != 1 else ''}", remedy)
     corner, side = cell_cube(points)
-    points = points[((points >= corner) & (points <= corner + side)).all(axis=1)]
-    low, high = points.min(axis=0), points.max(axis=0)
+    if side < float(np.ptp(_bounds(points), axis=0).max()):
+        points = points[((points >= corner) & (points <= corner + side)).all(axis=1)]
+    low, high = _bounds(points)
     extent = float(np.linalg.norm(high - low))
     if extent == 0:
         raise InputError(place, "all points are equal", remedy)
-    offsets = (points - low) / extent
-    offsets -= offsets.mean(axis=0)
-    widths = np.sqrt(np.maximum(np.linalg.eigvalsh(offsets.T @ offsets / len(points)), 0.0))
+    scatter = np.zeros((3, 3))
+    _fill_scatter(points, low, 1.0 / extent, scatter)
+    widths = np.sqrt(np.maximum(np.linalg.eigvalsh(scatter), 0.0))
     # the covariance of exactly flat points keeps rounding of its own size, and coordinates far away keep theirs
     rounding = 1e-7 + 4.0 * float(np.spacing(np.abs([low, high]).max())) / extent
     if widths[1] < rounding:
@@ -67,15 +69,65 @@ def cell_cube(points: FloatArray, enough: float = 0.0) -> tuple[FloatArray, floa
     enough : float
         A cube of this side can be resolved in any case.
     """
-    low, high = points.min(axis=0), points.max(axis=0)
+    low, high = _bounds(points)
     side = float((high - low).max())
-    if side <= max(enough, STRAY * float(np.abs(points - points.mean(axis=0)).mean(axis=0).max())):
+    if side <= enough or side <= STRAY * _widest_deviation(points, low):
         return low, side
     bounds = np.quantile(points, [0.01, 0.99], axis=0)
     limit = max(enough, FAR * float(np.ptp(bounds, axis=0).max()))
     if side <= limit or limit == 0:
         return low, side
     return bounds.mean(axis=0) - 0.5 * limit, limit
+
+
+def _bounds(points: FloatArray) -> FloatArray:
+    """Give the least and the greatest coordinates, shape (2, 3)."""
+    bounds = np.empty((2, 3))
+    _fill_bounds(points, bounds)
+    return bounds
+
+
+@njit(cache=True, nogil=True)
+def _fill_bounds(points: FloatArray, bounds: FloatArray) -> None:
+    for d in range(3):
+        bounds[0, d], bounds[1, d] = math.inf, -math.inf
+    for i in range(len(points)):
+        for d in range(3):
+            bounds[0, d], bounds[1, d] = min(bounds[0, d], points[i, d]), max(bounds[1, d], points[i, d])
+
+
+@njit(cache=True, nogil=True)
+def _widest_deviation(points: FloatArray, low: FloatArray) -> float:
+    """Give the mean absolute deviation from the mean, of the coordinate where it is greatest."""
+    widest = 0.0
+    for d in range(3):
+        mean, total = 0.0, 0.0
+        for i in range(len(points)):
+            mean += (points[i, d] - low[d]) / len(points)
+        for i in range(len(points)):
+            total += abs(points[i, d] - low[d] - mean)
+        widest = max(widest, total / len(points))
+    return widest
+
+
+@njit(cache=True, nogil=True)
+def _fill_scatter(points: FloatArray, low: FloatArray, scale: float, scatter: FloatArray) -> None:
+    """Fill in the covariance (3, 3) of the points times a scale, about their mean."""
+    mean, count = np.zeros(3), len(points)
+    for i in range(count):
+        for d in range(3):
+            mean[d] += (points[i, d] - low[d]) * scale / count
+    for i in range(count):
+        x = (points[i, 0] - low[0]) * scale - mean[0]
+        y = (points[i, 1] - low[1]) * scale - mean[1]
+        z = (points[i, 2] - low[2]) * scale - mean[2]
+        scatter[0, 0] += x * x / count
+        scatter[1, 0] += x * y / count
+        scatter[1, 1] += y * y / count
+        scatter[2, 0] += x * z / count
+        scatter[2, 1] += y * z / count
+        scatter[2, 2] += z * z / count
+    scatter[0, 1], scatter[0, 2], scatter[1, 2] = scatter[1, 0], scatter[2, 0], scatter[2, 1]
 
 
 def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray, float]:
@@ -119,7 +171,7 @@ def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
     Scene
     """
     ordered, _, codes, unit = canonical_order(points)
-    spacing, _, noise = measure_surface(ordered, codes, unit, np.random.default_rng([seed, 1]))
+    spacing, _, noise, _ = measure_surface(ordered, codes, unit, np.random.default_rng([seed, 1]))
     return Scene(spacing, noise, float(np.linalg.norm(np.ptp(points, axis=0))))
 
 
@@ -142,7 +194,7 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
     """
     ordered, order, codes, unit = canonical_order(points)
     rng = np.random.default_rng([config.seed, 1])
-    spacing, dense, measured = measure_surface(ordered, codes, unit, rng)
+    spacing, dense, measured, patches = measure_surface(ordered, codes, unit, rng)
     noise = config.scene.noise or measured
     sizes, deviations = noise_by_size(ordered, codes, unit, spacing, measured, rng)
     dense *= (config.scene.spacing or spacing) / spacing
@@ -157,6 +209,10 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
     unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # of a cloud wider than 2^21 voxels they are coarser
     codes = morton_codes(np.clip(ordered, 0.0, side), unit)
     again = np.argsort(codes, kind="stable")
+    scale = noise / measured
+    cell, cells, factors = noise_by_place(ordered[patches.middles], patches.deviations / measured, side)
+    keys = cell_keys(cells)
+    by_key = np.argsort(keys)
     frame = Frame(
         points=np.ascontiguousarray(ordered[again]),
         order=order[again],
@@ -164,7 +220,7 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
         unit=unit,
         voxel_level=level,
         window=window,
-        noise=Noise(sizes / spacing, deviations * (noise / measured) / spacing),
+        noise=Noise(sizes / spacing, deviations * scale / spacing, cell, keys[by_key], factors[by_key]),
         origin=corner,
         spacing=spacing,
     )

@@ -115,21 +115,31 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
 
 def _from_conic(conic: FloatArray) -> tuple[FloatArray, float, float, float] | None:
     """Give centre, semi-axes and angle of a conic, None if it is no real ellipse."""
-    a, b, c, d, e, f = (float(value) for value in conic)
+    shape = np.empty(5)
+    if not conic_shape(np.asarray(conic, dtype=np.float64), shape):
+        return None
+    return shape[:2].copy(), float(shape[2]), float(shape[3]), float(shape[4])
+
+
+@njit(cache=True, nogil=True)
+def conic_shape(conic: FloatArray, shape: FloatArray) -> bool:
+    """Fill `shape` (5,) with centre, semi-major, semi-minor and angle of a conic (6,); False if it is no ellipse."""
+    a, b, c, d, e, f = conic[0], conic[1], conic[2], conic[3], conic[4], conic[5]
     det = 4.0 * a * c - b * b
     if det <= 0.0:
-        return None
+        return False
     x, y = (b * e - 2.0 * c * d) / det, (b * d - 2.0 * a * e) / det
     level = f + 0.5 * (d * x + e * y)
-    root = math.hypot(a - c, b)
+    root = math.sqrt((a - c) ** 2 + b * b)
     flat, steep = 0.5 * (a + c - root), 0.5 * (a + c + root)
-    if a + c < 0:
+    if a + c < 0.0:
         flat, steep = steep, flat
     if flat == 0.0 or steep == 0.0 or -level / flat <= 0.0 or -level / steep <= 0.0:
-        return None
+        return False
     major, minor = math.sqrt(-level / flat), math.sqrt(-level / steep)
-    angle = 0.5 * math.atan2(b, a - c) + (0.5 * math.pi if a + c > 0 else 0.0)
-    return np.array([x, y]), max(major, minor), min(major, minor), angle
+    shape[0], shape[1], shape[2], shape[3] = x, y, max(major, minor), min(major, minor)
+    shape[4] = 0.5 * math.atan2(b, a - c) + (0.5 * math.pi if a + c > 0.0 else 0.0)
+    return True
 
 
 def ellipse_distances(ellipse: Ellipse, points: FloatArray) -> FloatArray:
@@ -182,7 +192,7 @@ def search_ellipse(
     middle = points.mean(axis=0)
     offsets = np.ascontiguousarray(points - middle)
     best = np.empty(6)
-    score = _consensus(offsets, samples, tolerance, semi_minor[0], semi_minor[1], max_aspect, best)
+    score = search_conic(offsets, samples, tolerance, semi_minor[0], semi_minor[1], max_aspect, best)
     if score <= 0.0:
         return Degenerate("no ellipse within the limits")
     shape = _from_conic(best)
@@ -203,7 +213,7 @@ def search_ellipse(
 
 
 @njit(cache=True, nogil=True)
-def _consensus(
+def search_conic(
     points: FloatArray,
     samples: IndexArray,
     tolerance: float,

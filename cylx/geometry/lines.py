@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.small_matrices import symmetric_eigen
 from cylx.geometry.vectors import cross
 
 FloatArray = NDArray[np.float64]
@@ -65,3 +69,55 @@ def common_perpendicular(
         np.where(parallel, 0.0, angle)[..., 0],
         axis,
     )
+
+
+@njit(cache=True, nogil=True)
+def fit_line(points: FloatArray, n: int, direction: FloatArray) -> float:
+    """Fit a line to points[:n] by principal components, trimmed twice; fill `direction` (3,).
+
+    Returns
+    -------
+    float
+        Root mean square distance from the line, over that along it.
+    """
+    matrix, vectors, mean = np.empty((3, 3)), np.empty((3, 3)), np.zeros(3)
+    width, ratio = math.inf, 1.0
+    direction[0], direction[1], direction[2] = 1.0, 0.0, 0.0
+    for _ in range(3):
+        total, count = np.zeros(3), 0
+        for i in range(n):
+            if _off_line(points, i, mean, direction) < width:
+                count += 1
+                for d in range(3):
+                    total[d] += points[i, d]
+        if count < 5:
+            return 1.0
+        inside = width
+        last = mean.copy()
+        for d in range(3):
+            mean[d] = total[d] / count
+            for e in range(3):
+                matrix[d, e] = 0.0
+        for i in range(n):
+            if _off_line(points, i, last, direction) < inside:
+                for d in range(3):
+                    for e in range(3):
+                        matrix[d, e] += (points[i, d] - mean[d]) * (points[i, e] - mean[e]) / count
+        symmetric_eigen(matrix, vectors)
+        longest = 0
+        for d in range(1, 3):
+            if matrix[d, d] > matrix[longest, longest]:
+                longest = d
+        across = matrix[0, 0] + matrix[1, 1] + matrix[2, 2] - matrix[longest, longest]
+        for d in range(3):
+            direction[d] = vectors[d, longest]
+        width = 2.5 * math.sqrt(max(across, 0.0))
+        ratio = math.sqrt(max(across, 0.0) / max(matrix[longest, longest], 1e-300))
+    return ratio
+
+
+@njit(cache=True, nogil=True)
+def _off_line(points: FloatArray, i: int, mean: FloatArray, direction: FloatArray) -> float:
+    dx, dy, dz = points[i, 0] - mean[0], points[i, 1] - mean[1], points[i, 2] - mean[2]
+    along = dx * direction[0] + dy * direction[1] + dz * direction[2]
+    return math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - along * along))

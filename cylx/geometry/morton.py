@@ -175,7 +175,11 @@ def thin(codes: IndexArray, level: int, keep: NDArray[np.bool_] | None = None) -
         Indices of the chosen points, ascending.
     """
     chosen = np.arange(len(codes)) if keep is None else np.flatnonzero(keep)
-    cells, starts = cell_starts(codes[chosen], level)
+    return chosen[pick_one(*cell_starts(codes[chosen], level))]
+
+
+def pick_one(cells: IndexArray, starts: IndexArray) -> IndexArray:
+    """Give one index of each cell's run, pseudo-randomly by the cell's code, shape (C,)."""
     # a multiplicative hash: the choice depends on the place alone, not on the order of the points or on a generator
     hashed = ((cells * GOLDEN) & 0x7FFFFFFFFFFFFFFF) >> 32
-    return np.asarray(chosen[starts[:-1] + hashed % np.diff(starts)], dtype=np.int64)
+    return np.asarray(starts[:-1] + hashed % np.diff(starts), dtype=np.int64)

@@ -8,7 +8,12 @@ from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.pipeline.conclusion import conclude
 from cylx.pipeline.journal import Journal
-from cylx.pipeline.sources import candidates_of_slices, ellipses_of_slices, windows_and_flatness
+from cylx.pipeline.sources import (
+    candidates_of_slices,
+    candidates_of_windows,
+    ellipses_of_slices,
+    windows_and_explained,
+)
 from cylx.pipeline.turns import Turns
 from cylx.pipeline.warmup import kernels_are_cold, practice_cloud
 from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
@@ -53,12 +58,14 @@ def extract_cylinders(
         config = resolve(config, scene)
         radii = radius_range(config, frame)
     with journal.stage("curvature"):
-        windows, flatness = windows_and_flatness(frame, radii, config, threads, journal)
-        ground = Ground(Cells(frame.points, frame.codes), flatness, frame.noise)
+        windows, explained = windows_and_explained(frame, radii, config, threads, journal)
+        ground = Ground(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
     with journal.stage("slicing"):
-        fits = ellipses_of_slices(frame, flatness, radii, config, threads, journal)
+        fits = ellipses_of_slices(frame, explained.flatness, radii, config, threads, journal)
     with journal.stage("candidates"):
-        candidates = Candidates.joined([windows, candidates_of_slices(fits, frame, radii, config, journal)])
+        whole = candidates_of_slices(fits, frame, radii, config, journal)
+        local = candidates_of_windows(frame, explained, radii, config, threads, journal)
+        candidates = Candidates.joined([windows, whole, local])
     with journal.stage("clustering"):
         players = thin_candidates(candidates) if config.clustering.population == "local" else candidates
         witnesses = windows if len(windows) else candidates

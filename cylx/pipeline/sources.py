@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, EllipseFit, Frame
+from cylx.records import Candidates, EllipseFit, Explained, Frame
 from cylx.stages.candidates import polish_candidates, propose_cylinders
 from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
+from cylx.stages.local_slices import slice_windows
 from cylx.stages.slicing import cut_slice, draw_planes
 
 FloatArray = NDArray[np.float64]
@@ -23,15 +24,18 @@ LINK = 4.0
 """Points of a slice within this many spacings are connected."""
 
 
-def windows_and_flatness(
+def windows_and_explained(
     frame: Frame, radii: tuple[float, float], config: Config, threads: int, journal: Journal
-) -> tuple[Candidates, FloatArray]:
+) -> tuple[Candidates, Explained]:
     """Propose candidates from curved windows, and tell which points lie in flat ones."""
-    if "curvature" not in config.candidates.sources:
-        return Candidates.joined([]), np.zeros(len(frame.points))
-    windows, flatness, report = find_curved_windows(frame, radii, config.candidates, threads)
-    journal.reports.append(report)
-    return windows, flatness
+    if "curvature" in config.candidates.sources:
+        windows, explained, report = find_curved_windows(frame, radii, config.candidates, threads)
+        journal.reports.append(report)
+        return windows, explained
+    explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
+    if config.slicing.local_planes:  # slices, too, pass over what is flat
+        explained.flatness[:] = find_curved_windows(frame, radii, config.candidates, threads)[1].flatness
+    return Candidates.joined([]), explained
 
 
 def ellipses_of_slices(
@@ -82,3 +86,18 @@ def candidates_of_slices(
         kept = polish_candidates(proposed, frame, radii, config.candidates)
     journal.report("candidates", len(proposed), len(kept), {"does not fit": len(proposed) - len(kept)})
     return kept
+
+
+def candidates_of_windows(
+    frame: Frame, explained: Explained, radii: tuple[float, float], config: Config, threads: int, journal: Journal
+) -> Candidates:
+    """Cut windows of all scales by planes, where nothing else explains the points."""
+    if "slices" not in config.candidates.sources or not config.slicing.local_planes:
+        return Candidates.joined([])
+    supported = config.candidates.min_inliers, config.candidates.min_share
+    found, counts = slice_windows(
+        frame, explained, radii, config.slicing, config.candidates.octave, supported, config.seed, threads
+    )
+    cut = counts.pop("slices")
+    journal.report("local slicing", cut, len(found), counts)
+    return found

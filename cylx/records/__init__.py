@@ -4,8 +4,9 @@ Many things of one kind travel as a structure of arrays (`Candidates`); the few 
 one. All records are frozen: a stage makes new ones and never changes those it was given.
 """
 
-from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source
+from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source, cell_keys
 from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
+from cylx.records.octaves import Explained, Octave
 from cylx.records.outcomes import CylinderFit, Extraction, Finding, Refusal, Rejection, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
 
@@ -14,12 +15,14 @@ __all__ = [
     "Cluster",
     "CylinderFit",
     "EllipseFit",
+    "Explained",
     "Extraction",
     "Finding",
     "Frame",
     "Ground",
     "Noise",
     "Observer",
+    "Octave",
     "PointCloud",
     "Refusal",
     "Rejection",
@@ -29,4 +32,5 @@ __all__ = [
     "Slice",
     "Source",
     "StageReport",
+    "cell_keys",
 ]

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cylx.geometry.cells import Cells
-from cylx.geometry.cylinder import Cylinder
+from cylx.geometry.cylinder import Cylinder, axis_frame
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -131,12 +132,18 @@ class Scene:
     extent: float
 
 
+def cell_keys(cells: IndexArray) -> IndexArray:
+    """Give one number for each cell (n, 3), shape (n,)."""
+    low = cells & 0x1FFFFF
+    return np.asarray((low[:, 0] << 42) | (low[:, 1] << 21) | low[:, 2], dtype=np.int64)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Noise:
-    """How far points scatter about their surface, by the size of the surface looked at.
+    """How far points scatter about their surface: by the size of the surface looked at, and by place.
 
     Neighbouring points of a stereo or depth camera err together, so the noise of a large piece exceeds that of a small
-    one.
+    one; and scanners see distant, dark or slanted surfaces less exactly.
 
     Parameters
     ----------
@@ -144,14 +151,37 @@ class Noise:
         Radii of the pieces, ascending.
     deviations : ndarray of shape (k,)
         Standard deviations, ascending.
+    side : float
+        Side of the cells in which the noise was measured by itself.
+    cells : ndarray of shape (C,)
+        Keys of the cells where it was, ascending; none if it is the same everywhere.
+    factors : ndarray of shape (C,)
+        How many times the usual it is there.
     """
 
     sizes: FloatArray
     deviations: FloatArray
+    side: float = 1.0
+    cells: IndexArray = field(default_factory=lambda: np.empty(0, np.int64))
+    factors: FloatArray = field(default_factory=lambda: np.empty(0))
 
     def at(self, size: float) -> float:
-        """Give the standard deviation over a piece of this radius; ends of the table hold beyond them."""
+        """Give the usual standard deviation over a piece of this radius; ends of the table hold beyond them."""
         return float(np.exp(np.interp(np.log(max(size, 1e-300)), np.log(self.sizes), np.log(self.deviations))))
+
+    def about(self, places: FloatArray, size: float) -> FloatArray:
+        """Give the standard deviations over pieces of this radius at places (n, 3), shape (n,)."""
+        return self.at(size) * self.factors_at(places)
+
+    def factors_at(self, places: FloatArray, unknown: float = 1.0) -> FloatArray:
+        """Give how many times the usual the noise is at places (n, 3), shape (n,); `unknown` where nobody knows."""
+        out = np.full(len(places), unknown)
+        if len(self.cells):
+            keys = cell_keys(np.floor(places / self.side).astype(np.int64))
+            where = np.minimum(np.searchsorted(self.cells, keys), len(self.cells) - 1)
+            known = self.cells[where] == keys
+            out[known] = self.factors[where[known]]
+        return out
 
     @property
     def least(self) -> float:
@@ -195,6 +225,12 @@ class Frame:
     origin: FloatArray
     spacing: float
 
+    def window_radii(self, octave: float) -> list[float]:
+        """Give the radii of windows of all scales, ascending, up to an eighth of the cloud's extent."""
+        extent = float(np.linalg.norm(np.ptp(self.points, axis=0)))
+        steps = max(1, math.ceil(math.log(max(extent / 8.0 / self.window, 1.0)) / math.log(octave)) + 1)
+        return [self.window * octave**k for k in range(steps)]
+
     def to_scene(self, cylinder: Cylinder) -> Cylinder:
         """Give a cylinder of the frame in scene units."""
         return cylinder.moved(self.origin, self.spacing)
@@ -223,9 +259,19 @@ class Ground:
         """The points, shape (N, 3)."""
         return self.cells.points
 
-    def noise_about(self, radius: float) -> float:
-        """Give the noise over the surface of a cylinder of this radius, a piece as large as its diameter."""
-        return self.noise.at(2.0 * radius)
+    def noise_about(self, model: FloatArray, half: float = 0.0) -> float:
+        """Give the noise over the surface of a cylinder (7,), a piece as large as its diameter, along its height."""
+        radius = float(model[6])
+        usual = self.noise.at(2.0 * radius)
+        if len(self.noise.cells) == 0:
+            return usual
+        frame = np.stack(axis_frame(model[3:6]))
+        turns = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+        around = radius * np.column_stack([np.cos(turns), np.sin(turns)]) @ frame
+        along = np.linspace(-half, half, 9)[:, None] * model[3:6] + model[:3]
+        factors = self.noise.factors_at((along[:, None] + around).reshape(-1, 3), math.nan)
+        known = factors[np.isfinite(factors)]
+        return usual * float(np.median(known)) if len(known) else usual
 
     def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
         """Tell which points may lie on a cylinder: those in flat windows of two radii belong to something flatter."""

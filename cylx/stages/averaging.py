@@ -83,7 +83,7 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         The fitted cylinder with its visible extent, or why there is none.
     """
     model, half = segment.model, segment.half
-    noise = ground.noise_about(model[6])
+    noise = ground.noise_about(model, half)
     first = model
     for step in range(GROWTH_STEPS):
         beyond = max(1.5 * model[6], 0.7 * half) if step else 0.5 * model[6]
@@ -132,7 +132,7 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     Segment or str
         With the bias of the radius taken off; or why there is none.
     """
-    noise, half = ground.noise_about(segment.model[6]), segment.half
+    noise, half = ground.noise_about(segment.model, segment.half), segment.half
     width = max(4.0 * noise, 0.02 * segment.model[6])
     end = BEYOND * half
     points = _own_points(ground, segment.model, end, 2.0 * width, most)
@@ -166,7 +166,7 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
     model, radius = segment.model, float(segment.model[6])
     reach = max(segment.half, radius) * 4.0
     # the average is as good as its candidates, so its surface is looked for in a wider shell than a fitted one's
-    width = max(5.0 * ground.noise_about(radius), 0.05 * radius)
+    width = max(5.0 * ground.noise_about(model, segment.half), 0.05 * radius)
     half = max(segment.half, 0.5 * radius)
     low = high = 0.0
     heights = distances = np.empty(0)

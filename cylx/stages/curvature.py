@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
 from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place, move_to_foot
-from cylx.geometry.morton import cell_starts, gather_ball, thin
+from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
-from cylx.records import Candidates, Frame, StageReport
+from cylx.geometry.small_matrices import fill_frame
+from cylx.records import Candidates, Explained, Frame, Octave, StageReport
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
+MaskArray = NDArray[np.bool_]
 
 CAPACITY = 2048
 """Most points of a window; thinned windows over one surface hold about 600."""
@@ -30,13 +32,14 @@ FEW_SEEDS = 3000
 FLAT_SHARE = 0.9
 """Share of a window's points within three noises of its plane that makes it flat."""
 OUTCOMES = ("too few points", "flat", "no curvature", "does not fit", "badly supported", "kept")
+LEAST_POINTS = 25
 COLUMNS = 10
 """Numbers a window fills in: the model (7), inliers, extent, spread."""
 
 
 def find_curved_windows(
     frame: Frame, radius_range: tuple[float, float], config: CandidatesConfig, threads: int
-) -> tuple[Candidates, FloatArray, StageReport]:
+) -> tuple[Candidates, Explained, StageReport]:
     """Propose a cylinder for each window whose points are curved one way.
 
     Parameters
@@ -51,25 +54,24 @@ def find_curved_windows(
     Returns
     -------
     candidates : Candidates
-    flatness : ndarray of shape (N,)
-        Radius of the largest flat window that holds the point, 0 if there is none.
+    explained : Explained
+        Which points lie in flat windows, and which on candidates.
     report : StageReport
     """
-    flatness = np.zeros(len(frame.points))
+    explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
     parts: list[Candidates] = []
     counts = np.zeros(len(OUTCOMES), np.int64)
-    for radius in reversed(window_radii(frame, config.octave)):
-        level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window)))
-        kept = thin(frame.codes, level, flatness == 0)
-        if len(kept) < 25:
+    for radius in reversed(frame.window_radii(config.octave)):
+        octave = Octave.of(frame, radius, explained.flatness == 0)
+        if len(octave.points) < LEAST_POINTS:
             continue
-        points, codes = frame.points[kept], frame.codes[kept]
-        seeds = _choose_seeds(codes, level, kept)
-        rows, outcome, planes = _look(frame, points, codes, level, seeds, radius, radius_range, config, threads)
+        seeds = octave.seeds(FEW_SEEDS)
+        rows, outcome, planes, marks = _look(frame, octave, seeds, radius_range, config, threads)
         counts += np.bincount(outcome, minlength=len(OUTCOMES))
+        octave.spread(marks, explained.curved)
         flat = outcome == 1
         if flat.any():
-            _mark_flat(frame, frame.points[kept[seeds[flat]]], planes[flat], radius, flatness)
+            _mark_flat(frame, octave, seeds[flat], planes[flat], explained.flatness)
         good = rows[outcome == 5]
         parts.append(
             Candidates(
@@ -82,53 +84,35 @@ def find_curved_windows(
         )
     found = Candidates.joined(parts)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:5], counts[:5], strict=True) if n}
-    return found, flatness, StageReport("curvature", int(counts.sum()), len(found), rejected)
-
-
-def window_radii(frame: Frame, octave: float) -> list[float]:
-    """Give the radii of the windows, ascending, up to an eighth of the cloud's extent."""
-    extent = float(np.linalg.norm(np.ptp(frame.points, axis=0)))
-    steps = max(1, math.ceil(math.log(max(extent / 8.0 / frame.window, 1.0)) / math.log(octave)) + 1)
-    return [frame.window * octave**k for k in range(steps)]
-
-
-def _choose_seeds(codes: IndexArray, level: int, kept: IndexArray) -> IndexArray:
-    """Give indices into the thinned points, one a cell of sixteen voxels, of eight or four where that makes few."""
-    for shift in (4, 3, 2):
-        seeds = thin(codes, level + shift)
-        if len(seeds) >= FEW_SEEDS:
-            break
-    return seeds
+    return found, explained, StageReport("curvature", int(counts.sum()), len(found), rejected)
 
 
 def _look(
     frame: Frame,
-    points: FloatArray,
-    codes: IndexArray,
-    level: int,
+    octave: Octave,
     seeds: IndexArray,
-    radius: float,
     radius_range: tuple[float, float],
     config: CandidatesConfig,
     threads: int,
-) -> tuple[FloatArray, IndexArray, FloatArray]:
+) -> tuple[FloatArray, IndexArray, FloatArray, MaskArray]:
     """Look through the windows about all seeds, in chunks over threads."""
-    cells, starts = cell_starts(codes, level + 3)
-    side = frame.unit * 2.0 ** (level + 3)
     rows, planes = np.zeros((len(seeds), COLUMNS)), np.zeros((len(seeds), 6))
-    outcome = np.zeros(len(seeds), np.int64)
+    outcome, marks = np.zeros(len(seeds), np.int64), np.zeros(len(octave.points), np.bool_)
+    noises = frame.noise.about(octave.points[seeds], 2.0 * octave.radius)
     chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 64)))
 
     def work(chunk: IndexArray) -> None:
+        if len(chunk) == 0:
+            return
         first, last = int(chunk[0]), int(chunk[-1]) + 1
         _scan(
-            points,
-            cells,
-            starts,
-            side,
+            octave.points,
+            octave.cells,
+            octave.starts,
+            octave.side,
             seeds[first:last],
-            radius,
-            frame.noise.at(2.0 * radius),
+            octave.radius,
+            noises[first:last],
             radius_range[0],
             radius_range[1],
             config.min_inliers,
@@ -136,11 +120,12 @@ def _look(
             rows[first:last],
             outcome[first:last],
             planes[first:last],
+            marks,
         )
 
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(work, chunks))
-    return rows, outcome, planes
+    return rows, outcome, planes, marks
 
 
 @njit(cache=True, nogil=True)
@@ -151,7 +136,7 @@ def _scan(
     side: float,
     seeds: IndexArray,
     radius: float,
-    noise: float,
+    noises: FloatArray,
     least: float,
     greatest: float,
     min_inliers: int,
@@ -159,6 +144,7 @@ def _scan(
     rows: FloatArray,
     outcome: IndexArray,
     planes: FloatArray,
+    marks: MaskArray,
 ) -> None:
     found = np.empty(CAPACITY, np.int64)
     around, inner = np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
@@ -167,7 +153,7 @@ def _scan(
     right, axes = np.empty(6), np.empty((2, 3))
     quality, bins = np.empty(4), np.empty(36, np.int64)
     for s in range(len(seeds)):
-        seed, model = points[seeds[s]], rows[s, :7]
+        seed, model, noise = points[seeds[s]], rows[s, :7], noises[s]
         n = gather_ball(points, cells, starts, side, seed, 2.0 * radius, found)
         m = _center_window(points, found, n, seed, radius, around, inner)
         if m < 12 or n < 20:
@@ -200,6 +186,7 @@ def _scan(
         if quality[0] < min_inliers or quality[0] < min_share * n or quality[1] < 0.8 * radius:
             continue
         outcome[s] = 5
+        _mark_explained(around, found, n, model, 3.0 * noise, axes, marks)
         move_to_foot(model, seed)
         rows[s, 7], rows[s, 8], rows[s, 9] = quality[0], quality[1], spread
 
@@ -228,21 +215,32 @@ def _center_window(
     return m
 
 
-def _mark_flat(frame: Frame, seeds: FloatArray, planes: FloatArray, radius: float, flatness: FloatArray) -> None:
+@njit(cache=True, nogil=True)
+def _mark_explained(
+    points: FloatArray,
+    found: IndexArray,
+    n: int,
+    model: FloatArray,
+    width: float,
+    frame: FloatArray,
+    marks: MaskArray,
+) -> None:
+    """Mark the points of a window that lie on its cylinder; threads may mark the same ones, which does no harm."""
+    fill_frame(model[3:6], frame)
+    for i in range(n):
+        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        if abs(math.sqrt(x * x + y * y) - model[6]) < width:
+            marks[found[i]] = True
+
+
+def _mark_flat(frame: Frame, octave: Octave, seeds: IndexArray, planes: FloatArray, flatness: FloatArray) -> None:
     """Give the points about flat windows, within three noises of their planes, the radius of the window."""
-    level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window))) + 3
-    cells, starts = cell_starts(frame.codes, level)
-    _mark(
-        frame.points,
-        cells,
-        starts,
-        frame.unit * 2.0**level,
-        seeds,
-        planes,
-        2.0 * radius,
-        3.0 * frame.noise.at(2.0 * radius),
-        flatness,
-    )
+    cells, starts = cell_starts(frame.codes, octave.level + 3)
+    places = octave.points[seeds]
+    widths = 3.0 * frame.noise.about(places, 2.0 * octave.radius)
+    _mark(frame.points, cells, starts, octave.side, places, planes, 2.0 * octave.radius, widths, flatness)
 
 
 @njit(cache=True, nogil=True)
@@ -254,7 +252,7 @@ def _mark(
     seeds: FloatArray,
     planes: FloatArray,
     reach: float,
-    width: float,
+    widths: FloatArray,
     flatness: FloatArray,
 ) -> None:
     found = np.empty(len(points), np.int64)
@@ -266,5 +264,5 @@ def _mark(
                 height = 0.0
                 for d in range(3):
                     height += (points[i, d] - planes[s, d]) * planes[s, 3 + d]
-                if abs(height) < width:
+                if abs(height) < widths[s]:
                     flatness[i] = reach

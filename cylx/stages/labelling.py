@@ -56,7 +56,7 @@ def surface_points(segment: Segment, ground: Ground) -> tuple[IndexArray, FloatA
         About the axis, in (-pi, pi].
     """
     radius = segment.model[6]
-    reach = 3.0 * max(segment.spread, ground.noise_about(radius))
+    reach = 3.0 * max(segment.spread, ground.noise_about(segment.model, segment.half))
     near = ground.cells.near_cylinder(
         segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
     )

@@ -92,7 +92,7 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
 def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
     """Fit one cylinder to two pieces; None if it does not explain both."""
     one, two = a.segment, b.segment
-    noise = ground.noise_about(one.model[6])
+    noise = ground.noise_about(one.model, one.half)
     if abs(one.model[3:6] @ two.model[3:6]) < COSINE:
         return None
     if min(one.model[6], two.model[6]) < RADIUS_RATIO * max(one.model[6], two.model[6]):

@@ -101,7 +101,8 @@ class Shell:
 
 def look_at(segment: Segment, ground: Ground) -> Shell:
     """Collect the points in and about a segment."""
-    model, half, noise = segment.model, segment.half, ground.noise_about(segment.model[6])
+    model, half = segment.model, segment.half
+    noise = ground.noise_about(model, half)
     deviation = max(min(segment.spread, 2.0 * noise), noise)
     near = ground.cells.near_cylinder(model, -half, half, 0.0, model[6] + max(0.5 * model[6], 10.0 * deviation))
     heights, distances, angles = cylinder_coordinates(ground.points[near], model[:3], model[3:6])
@@ -143,7 +144,7 @@ def verify(
         return Verdict("too few points", 0.0, {}, 0.0, points)
     coverage, sectors = covered_angle(shell.angles[shell.on])
     radius = float(segment.model[6])
-    noise = ground.noise_about(radius)
+    noise = ground.noise_about(segment.model, segment.half)
     deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
     shape = _shape(shell, segment, deviation)
     lack, structure = _lack_of_fit(shell, deviation)

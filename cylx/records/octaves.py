@@ -1,0 +1,95 @@
+"""A cloud at one scale: thinned to the size of the windows that look at it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.geometry.morton import cell_starts, pick_one, thin
+from cylx.records.clouds import Frame
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+MaskArray = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Octave:
+    """The points that windows of one radius see: one of each voxel, a sixth to a twelfth of the radius wide.
+
+    Parameters
+    ----------
+    radius : float
+        Of the windows, frame units.
+    level : int
+        Level of the voxels.
+    points : ndarray of shape (n, 3)
+        One point of each voxel, in Morton order.
+    codes : ndarray of shape (n,)
+        Their Morton codes.
+    indices : ndarray of shape (n,)
+        Which points of the frame they are.
+    cells, starts, side
+        Cells of eight voxels' width for `gather_ball`.
+    members : ndarray of shape (m,)
+        The points of the frame that were thinned, ascending.
+    runs : ndarray of shape (n + 1,)
+        Members `runs[i]:runs[i + 1]` lie in the voxel of point i.
+    """
+
+    radius: float
+    level: int
+    points: FloatArray
+    codes: IndexArray
+    indices: IndexArray
+    cells: IndexArray
+    starts: IndexArray
+    side: float
+    members: IndexArray
+    runs: IndexArray
+
+    @classmethod
+    def of(cls, frame: Frame, radius: float, keep: MaskArray) -> Octave:
+        """Thin the points to keep of a frame for windows of a radius."""
+        level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window)))
+        members = np.flatnonzero(keep)
+        voxels, runs = cell_starts(frame.codes[members], level)
+        indices = members[pick_one(voxels, runs)]
+        codes = frame.codes[indices]
+        cells, starts = cell_starts(codes, level + 3)
+        side = frame.unit * 2.0 ** (level + 3)
+        return cls(radius, level, frame.points[indices], codes, indices, cells, starts, side, members, runs)
+
+    def seeds(self, enough: int, keep: MaskArray | None = None) -> IndexArray:
+        """Choose places for windows, evenly: indices of points, one of each cell of sixteen voxels' width.
+
+        Of eight or of four where that makes fewer than `enough`; only points to `keep`, if given.
+        """
+        for shift in (4, 3, 2):
+            chosen = thin(self.codes, self.level + shift, keep)
+            if len(chosen) >= enough:
+                break
+        return chosen
+
+    def spread(self, marks: MaskArray, out: MaskArray) -> None:
+        """Mark all members of the voxels whose point is marked."""
+        out[self.members[np.repeat(marks, np.diff(self.runs))]] = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Explained:
+    """What the points have been found to lie on, filled in as the windows become finer.
+
+    Parameters
+    ----------
+    flatness : ndarray of shape (N,)
+        Radius of the largest flat window that holds the point, 0 if there is none; frame units.
+    curved : ndarray of shape (N,), bool
+        Whether a candidate of local curvature passes by the point.
+    """
+
+    flatness: FloatArray
+    curved: MaskArray

@@ -1,0 +1,295 @@
+"""Frame -> candidates: slices through windows of every scale, where local curvature has not found what is there.
+
+The paper's slices through the whole cloud rarely cut a given pipe of a large scene. Slices through windows do, and two
+kinds of them help where points are few: planes in all directions, and one across the longest direction of what is in
+the window, as thick as the window itself, in which a thin pipe is a circle however sparse its points are.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.config import SlicingConfig
+from cylx.geometry.circle import search_circle
+from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place, move_to_foot
+from cylx.geometry.ellipse import conic_shape, search_conic
+from cylx.geometry.lines import fit_line
+from cylx.geometry.morton import gather_ball
+from cylx.geometry.small_matrices import fill_frame
+from cylx.records import Candidates, Explained, Frame, Octave
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+CAPACITY = 2048
+"""Most points of a window."""
+SAMPLES = 48
+"""Samples of five points a slice."""
+THICKNESS = 0.15
+"""Half thickness of a slice in radii of its window."""
+SLIM = 0.25
+"""A window's points are elongated if they scatter less than this share of their length about their line."""
+FEWEST = 15
+"""Points without which nothing is tried in a window."""
+COUNTS = ("slices", "too few points", "no ellipse", "does not fit")
+
+
+def slice_windows(
+    frame: Frame,
+    explained: Explained,
+    radius_range: tuple[float, float],
+    config: SlicingConfig,
+    octave_ratio: float,
+    supported: tuple[int, float],
+    seed: int,
+    threads: int,
+) -> tuple[Candidates, dict[str, int]]:
+    """Propose a cylinder for each window that holds points nobody has explained.
+
+    Parameters
+    ----------
+    frame : Frame
+    explained : Explained
+        What lies in flat windows or on candidates of local curvature; no window is laid there.
+    radius_range : tuple of float
+        Least and greatest radius, frame units.
+    config : SlicingConfig
+    octave_ratio : float
+        Ratio of successive window radii.
+    supported : (int, float)
+        Fewest points of a candidate, and their least share of its window.
+    seed : int
+    threads : int
+        Does not change the result.
+
+    Returns
+    -------
+    candidates : Candidates
+    counts : dict of str to int
+        Slices cut, and what became of those without a candidate.
+    """
+    parts: list[Candidates] = []
+    totals = np.zeros(len(COUNTS), np.int64)
+    for radius in reversed(frame.window_radii(octave_ratio)):
+        octave = Octave.of(frame, radius, explained.flatness == 0)
+        if len(octave.points) < FEWEST:
+            continue
+        open_points = ~explained.curved[octave.indices]
+        seeds = octave.seeds(config.windows // 2, open_points)
+        stride = max(1, math.ceil(len(seeds) / config.windows))
+        rows, counts = _look(
+            frame, octave, seeds[::stride], radius_range, config.local_planes, supported, seed, threads
+        )
+        totals += counts
+        good = rows[rows[:, 7] > 0]
+        parts.append(
+            Candidates(
+                good[:, :7].copy(),
+                np.arange(len(good)),
+                good[:, 8].copy(),
+                good[:, 7].astype(np.int64),
+                np.full(len(good), radius),
+            )
+        )
+    return Candidates.joined(parts), dict(zip(COUNTS, totals.tolist(), strict=True))
+
+
+def _look(
+    frame: Frame,
+    octave: Octave,
+    seeds: IndexArray,
+    radius_range: tuple[float, float],
+    planes: int,
+    supported: tuple[int, float],
+    seed: int,
+    threads: int,
+) -> tuple[FloatArray, IndexArray]:
+    """Look through the windows about all seeds, in chunks over threads; each window draws from its own place."""
+    rows = np.zeros((len(seeds), 9))
+    chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 16)))
+    noises = frame.noise.about(octave.points[seeds], 2.0 * octave.radius)
+    draws = octave.codes[seeds] ^ np.int64(0x2545F491 * (seed + 1))
+
+    def work(chunk: IndexArray) -> IndexArray:
+        counts = np.zeros(len(COUNTS), np.int64)
+        if len(chunk):
+            part = slice(int(chunk[0]), int(chunk[-1]) + 1)
+            _slice_windows(
+                octave.points,
+                octave.cells,
+                octave.starts,
+                octave.side,
+                seeds[part],
+                2.0 * octave.radius,
+                noises[part],
+                draws[part],
+                planes,
+                radius_range,
+                supported,
+                rows[part],
+                counts,
+            )
+        return counts
+
+    with ThreadPoolExecutor(threads) as pool:
+        totals = np.sum(list(pool.map(work, chunks)), axis=0)
+    return rows, np.asarray(totals, dtype=np.int64)
+
+
+@njit(cache=True, nogil=True)
+def _draw(state: int) -> int:
+    """Give the next state of a xorshift generator; its upper bits are as good as random."""
+    state ^= (state << 13) & 0x7FFFFFFFFFFFFFFF
+    state ^= state >> 7
+    state ^= (state << 17) & 0x7FFFFFFFFFFFFFFF
+    return state
+
+
+@njit(cache=True, nogil=True)
+def _slice_windows(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    seeds: IndexArray,
+    reach: float,
+    noises: FloatArray,
+    draws: IndexArray,
+    planes: int,
+    radius_range: tuple[float, float],
+    supported: tuple[int, float],
+    rows: FloatArray,
+    counts: IndexArray,
+) -> None:
+    found, around = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3))
+    flat, samples = np.empty((CAPACITY, 2)), np.empty((SAMPLES, 5), np.int64)
+    model, normal, frame = np.empty(7), np.empty(3), np.empty((2, 3))
+    shape, conic = np.empty(5), np.empty(6)
+    for s in range(len(seeds)):
+        seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1
+        for _ in range(4):
+            state = _draw(state)
+        n = gather_ball(points, cells, starts, side, seed, reach, found)
+        if n < FEWEST:
+            continue
+        for a in range(n):
+            for d in range(3):
+                around[a, d] = points[found[a], d] - seed[d]
+        least, greatest = max(radius_range[0], 4.0 * noise), min(radius_range[1], 0.75 * reach)
+        best = 0.0
+        for p in range(planes + 1):
+            counts[0] += 1
+            # the first one across the longest direction, as thick as the window; then in all directions
+            thick = math.inf if p == 0 else THICKNESS * reach
+            offset = 0.0
+            if p == 0:
+                if fit_line(around, n, normal) > SLIM:
+                    counts[1] += 1
+                    continue
+            else:
+                state = _fill_normal(state, normal)
+                state = _draw(state)
+                k = (state >> 20) % n
+                offset = around[k, 0] * normal[0] + around[k, 1] * normal[1] + around[k, 2] * normal[2]
+            fill_frame(normal, frame)
+            m = _project(around, n, normal, offset, thick, frame, flat)
+            if m < FEWEST:
+                counts[1] += 1
+                continue
+            for k in range(SAMPLES):
+                for d in range(5):
+                    state = _draw(state)
+                    samples[k, d] = (state >> 20) % m
+            tolerance = 3.0 * noise + (0.02 * reach if p == 0 else 0.06 * thick)
+            if p == 0:
+                support = search_circle(flat[:m], samples, tolerance, least, greatest, shape)
+            else:
+                support = search_conic(flat[:m], samples, tolerance, least, greatest, 3.0, conic)
+                support = support if support > 0.0 and conic_shape(conic, shape) else 0.0
+            if support < 0.5 * FEWEST or support < 0.25 * m:
+                counts[2] += 1
+                continue
+            fits = False
+            for turn in range(1 if p == 0 else 2):
+                _set_model(normal, offset, frame, shape, 1.0 if turn == 0 else -1.0, model)
+                quality = _polish(around, n, model, noise, radius_range, supported)
+                if quality[0] > 0.0:
+                    fits = True
+                if quality[0] > best:
+                    best = quality[0]
+                    move_to_foot(model, seed)
+                    for d in range(7):
+                        rows[s, d] = model[d]
+                    rows[s, 7], rows[s, 8] = quality[0], quality[1]
+            counts[3] += 0 if fits else 1
+
+
+@njit(cache=True, nogil=True)
+def _fill_normal(state: int, normal: FloatArray) -> int:
+    """Draw a direction evenly from the sphere; give the next state."""
+    state = _draw(state)
+    z = 2.0 * ((state >> 20) % 1048576) / 1048576.0 - 1.0
+    state = _draw(state)
+    turn = 2.0 * math.pi * ((state >> 20) % 1048576) / 1048576.0
+    across = math.sqrt(max(0.0, 1.0 - z * z))
+    normal[0], normal[1], normal[2] = across * math.cos(turn), across * math.sin(turn), z
+    return state
+
+
+@njit(cache=True, nogil=True)
+def _project(
+    points: FloatArray, n: int, normal: FloatArray, offset: float, thick: float, frame: FloatArray, flat: FloatArray
+) -> int:
+    """Fill in the coordinates in the plane of the points close to it; count them."""
+    m = 0
+    for i in range(n):
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if abs(x * normal[0] + y * normal[1] + z * normal[2] - offset) < thick:
+            flat[m, 0] = x * frame[0, 0] + y * frame[0, 1] + z * frame[0, 2]
+            flat[m, 1] = x * frame[1, 0] + y * frame[1, 1] + z * frame[1, 2]
+            m += 1
+    return m
+
+
+@njit(cache=True, nogil=True)
+def _set_model(
+    normal: FloatArray, offset: float, frame: FloatArray, shape: FloatArray, sign: float, model: FloatArray
+) -> None:
+    """Set one of the two cylinders that cut a plane in an ellipse: eq. 3 and 4 of the paper."""
+    cosine = shape[3] / shape[2]
+    sine = sign * math.sqrt(max(0.0, 1.0 - cosine * cosine))
+    along, across = math.cos(shape[4]), math.sin(shape[4])
+    for d in range(3):
+        model[d] = shape[0] * frame[0, d] + shape[1] * frame[1, d] + offset * normal[d]
+        model[3 + d] = cosine * normal[d] + sine * (along * frame[0, d] + across * frame[1, d])
+    model[6] = shape[3]
+
+
+@njit(cache=True, nogil=True)
+def _polish(
+    points: FloatArray,
+    n: int,
+    model: FloatArray,
+    noise: float,
+    radius_range: tuple[float, float],
+    supported: tuple[int, float],
+) -> FloatArray:
+    """Fit a cylinder to its window; give inliers and extent, zeros if it does not fit."""
+    matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
+    quality, bins, first = np.zeros(4), np.empty(36, np.int64), model[6]
+    floor = max(3.0 * noise, 0.01 * first)
+    start = max(0.3 * first, 4.0 * noise)
+    spread = fit_in_place(points, n, model, -math.inf, math.inf, start, floor, 0.6, math.inf, 10, matrix, right, frame)
+    if spread < 0.0 or spread > 0.34 * floor:
+        return quality
+    if not (max(radius_range[0], 0.5 * first) <= model[6] <= min(radius_range[1], 2.0 * first)):
+        return quality
+    candidate_quality(points, n, model, 3.0 * noise, frame, bins, quality)
+    if quality[0] < supported[0] or quality[0] < supported[1] * n or quality[1] < 0.5 * model[6]:
+        quality[0] = 0.0
+    return quality
