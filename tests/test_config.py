@@ -6,8 +6,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cylx.config import Config, Section, load_config, named_options, preset_names
+from cylx.config import Config, Section, load_config, preset_names
 from cylx.config_faults import dotted_keys
+from cylx.config_layers import named_options
 from cylx.config_text import commented_yaml, plain_yaml
 from cylx.errors import ConfigError
 from cylx.strict_yaml import parse_yaml
