@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cylx.config import Config, load_config
+from cylx.config import Config, check_tolerance, load_config
 from cylx.config_layers import named_options
 from cylx.io import read_cloud
 from cylx.pipeline import extract_cylinders
@@ -85,21 +85,23 @@ def extract(
     >>> [round(fit.cylinder.radius, 1) for fit in found.cylinders]
     [1.0]
     """
+    options = named_options(
+        seed=seed,
+        radius=radius,
+        max_cylinders=max_cylinders,
+        planes=planes,
+        axis=axis,
+        axis_tolerance_deg=axis_tolerance_deg,
+        min_coverage_deg=min_coverage_deg,
+    )
     settings = load_config(
         path=None if config is None or isinstance(config, Config) else Path(config),
         start=config if isinstance(config, Config) else None,
         preset=preset,
         overrides=overrides,
-        options=named_options(
-            seed=seed,
-            radius=radius,
-            max_cylinders=max_cylinders,
-            planes=planes,
-            axis=axis,
-            axis_tolerance_deg=axis_tolerance_deg,
-            min_coverage_deg=min_coverage_deg,
-        ),
+        options=options,
     )
+    check_tolerance(settings, options)
     if isinstance(points_or_path, PointCloud):
         cloud = points_or_path
     elif isinstance(points_or_path, str | PathLike):

@@ -242,11 +242,20 @@ def load_config(
     merged = preset_layer(names[-1] if names else "auto").values
     for layer in given:
         merged = merge(merged, layer.values)
-    config = _validate(merged, given)
-    if config.scene.axis is None and "scene.axis_tolerance_deg" in (options or {}):
+    return _validate(merged, given)
+
+
+def check_tolerance(config: Config, options: Mapping[str, object]) -> None:
+    """Refuse a tolerance that was asked for by name, by `named_options`, where there is no axis.
+
+    Raises
+    ------
+    ConfigError
+        If so.
+    """
+    if config.scene.axis is None and "scene.axis_tolerance_deg" in options:
         fault = "is given without the axis that it is to hold for"
         raise ConfigError("axis tolerance", fault, "give --axis X,Y,Z, or scene.axis, too")
-    return config
 
 
 def preset_names() -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cylx import __version__
-from cylx.config import Config, load_config
+from cylx.config import load_config
 from cylx.geometry.cylinder import cylinder_coordinates, surface_distances
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud
@@ -128,8 +128,25 @@ def test_the_keys_are_those_of_a_cylinder_but_for_the_reason(found):
 
 
 def test_nothing_refused_is_an_empty_list(make_extraction):
-    content = Rejections.of(make_extraction(config=Config())).to_object()
-    assert content["rejected"] == []
+    assert Rejections.of(make_extraction(rejected=0)).to_object()["rejected"] == []
+
+
+def test_the_numbers_are_those_of_the_extraction(make_extraction):
+    (rejected,) = Rejections.of(make_extraction()).to_object()["rejected"]
+    assert rejected == {
+        "reason": "agreement",
+        "axis_point": [1, 0, 0],
+        "axis_direction": [0, 1, 0],
+        "radius": 0.5,
+        "height": 1,
+        "start": [1, -0.5, 0],
+        "end": [1, 0.5, 0],
+        "inliers": 7,
+        "rmse": 0.125,
+        "coverage_deg": 180,
+        "support": 3,
+        "payoff": 0.5,
+    }
 
 
 def test_every_key_of_the_schema_has_a_meaning():

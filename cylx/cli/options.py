@@ -126,7 +126,7 @@ def configured(command: Command) -> Command:
         min_coverage_deg: float | None,
         **others: object,
     ) -> object:
-        from cylx.config import load_config
+        from cylx.config import check_tolerance, load_config
         from cylx.config_layers import named_options
 
         options = named_options(
@@ -139,6 +139,7 @@ def configured(command: Command) -> Command:
             min_coverage_deg=min_coverage_deg,
         )
         settings = load_config(path=config, preset=preset, overrides=overrides, options=options)
+        check_tolerance(settings, options)
         return command(*args, settings=settings, **others)
 
     for option in reversed(_CONFIGURATION):
