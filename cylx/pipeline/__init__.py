@@ -9,6 +9,7 @@ from cylx.geometry.cells import Cells
 from cylx.pipeline.conclusion import conclude
 from cylx.pipeline.journal import Journal
 from cylx.pipeline.sources import (
+    candidates_along_axis,
     candidates_of_slices,
     candidates_of_windows,
     ellipses_of_slices,
@@ -67,7 +68,8 @@ def extract_cylinders(
         local = candidates_of_windows(frame, explained, radii, config, threads, journal)
         candidates = Candidates.joined([windows, whole, local])
     with journal.stage("clustering"):
-        players = thin_candidates(candidates) if config.clustering.population == "local" else candidates
+        players = candidates_along_axis(candidates, config, journal)
+        players = thin_candidates(players) if config.clustering.population == "local" else players
         witnesses = windows if len(windows) else candidates
         game = CandidateGame(players, config.clustering, threads)
         turns = Turns(game, players, witnesses, ground, radii, config, threads)
