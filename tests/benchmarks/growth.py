@@ -42,7 +42,7 @@ def measure(scene, folder, times, bars):
 
 def compare_times(rows, bars, bar):
     """Say how the time grew from a million points to the largest scene."""
-    near = min(rows, key=lambda row: abs(row[0] - REFERENCE), default=None)
+    near = next((row for row in rows if REFERENCE / 2 < row[0] < REFERENCE * 2), None)
     most = max(rows, default=None)
     if near is None or near == most:
         print("\nThe growth needs a scene of about a million points, and a larger one.")
