@@ -47,7 +47,7 @@ class Sweep:
 SWEEPS = {
     "coverage": Sweep("coverage, °", (30, 45, 60, 90, 120, 180, 270, 360)),
     "height": Sweep("height, r", (0.5, 0.75, 1, 1.5, 2, 3, 4)),
-    "points": Sweep("points", (50, 100, 200, 400, 1000, 2000), logarithmic=True),
+    "points": Sweep("points", (50, 70, 100, 200, 400, 1000, 2000), logarithmic=True),
     "outliers": Sweep("share of outliers", (0, 0.2, 0.4, 0.5, 0.6, 0.7, 0.8), floors=(False, True)),
 }
 
