@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from runs import extract, give_up, warm_up
+from runs import extract, require_scenes, truth_of, warm_up
 from tables import Bars, print_header, print_row
 
 from cylx.evaluation import evaluate
@@ -28,17 +28,13 @@ def main():
     parser.add_argument("scenes", metavar="PAIR.ply", nargs="+", type=Path)
     parser.add_argument("--max-angle", type=float, metavar="BAR", help="exit with 1 if an angle is larger, degrees")
     a = parser.parse_args()
-    lacking = [
-        str(path) for scene in a.scenes for path in (scene, scene.with_suffix(".truth.json")) if not path.is_file()
-    ]
-    if lacking:
-        give_up(f"missing: {', '.join(lacking)}; tests/benchmarks/scenes_make.py makes the scenes")
+    require_scenes(a.scenes)
     bars = Bars()
     print_header("scene", "cans found", "false", "angle between their axes, °", "between their radii, %", "bar")
     with tempfile.TemporaryDirectory() as folder:
         warm_up(folder)
         for scene in a.scenes:
-            truth = json.loads(scene.with_suffix(".truth.json").read_text(encoding="utf-8"))
+            truth = json.loads(truth_of(scene).read_text(encoding="utf-8"))
             result = extract(scene, folder)[1] or {"cylinders": []}
             score = evaluate(truth, result)
             by_id = {cylinder["id"]: cylinder for cylinder in result["cylinders"]}

@@ -61,6 +61,18 @@ def warm_up(folder):
         give_up("cylx cannot extract its own sample")
 
 
+def truth_of(scene):
+    """Name the truth that belongs to a scene."""
+    return Path(scene).with_suffix(".truth.json")
+
+
+def require_scenes(scenes):
+    """Give up unless all scenes are there with their truths."""
+    lacking = [str(path) for scene in scenes for path in (scene, truth_of(scene)) if not path.is_file()]
+    if lacking:
+        give_up(f"missing: {', '.join(lacking)}; tests/benchmarks/scenes_make.py makes the scenes")
+
+
 def give_up(message):
     """End the program because something it needs is missing."""
     print(message, file=sys.stderr)

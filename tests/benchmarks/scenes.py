@@ -1,7 +1,8 @@
 """Scenes with many things in them: what is found, how exactly, how fast, and in how much memory.
 
 Each SCENE.ply has its SCENE.truth.json beside it. `cylx extract` runs as a whole process, with everything after `--`
-passed on to it, and writes into a folder that is removed afterwards.
+passed on to it, and writes into a folder that is removed afterwards. Families that a prototype of the method was run
+on are listed once more, its F1 beside this one; its scenes are of the same families with other seeds.
 """
 
 import argparse
@@ -11,7 +12,7 @@ import tempfile
 from pathlib import Path
 from statistics import fmean
 
-from runs import extract, give_up, warm_up
+from runs import extract, require_scenes, truth_of, warm_up
 from tables import Bars, number, print_header, print_row
 
 from cylx.evaluation import evaluate
@@ -20,6 +21,13 @@ COLUMNS = (
     "scene", "points", "to find", "precision", "recall", "F1",
     "angle, °", "offset, r", "radius, %", "seconds", "peak MB",
 )  # fmt: skip
+PROTOTYPE_F1 = {
+    "clutter 300k": (1.000, 0.974, 1.000, 1.000),
+    "clutter 1000k": (0.988,),
+    "rack 1000k": (0.995, 0.990),
+    "ycb-table": (1.000, 1.000, 1.000),
+    "ycb-view": (1.000, 1.000),
+}  # a scene each, as its own report gives them
 
 
 def family(truth):
@@ -67,9 +75,22 @@ def name_faults(score, truth, result):
         yield from (f"  {name}: {describe(entry)}" for entry in chosen)
 
 
+def print_beside_the_prototype(families):
+    """Print a row for each family the prototype was run on."""
+    known = [name for name in families if name in PROTOTYPE_F1]
+    if known:
+        print()
+        print_header("family", "F1, mean", "F1, lowest", "scenes", "the prototype's F1, mean", "lowest", "its scenes")
+    for name in known:
+        cells = [name]
+        for f1 in ([values[2] for _, _, values in families[name]], PROTOTYPE_F1[name]):
+            cells += [f"{fmean(f1):.3f}", f"{min(f1):.3f}", str(len(f1))]
+        print_row(*cells)
+
+
 def measure(scene, folder, *, times, extra):
     """Extract one scene and compare it with its truth: the truth, the numbers of its row, and its faults in words."""
-    truth = json.loads(scene.with_suffix(".truth.json").read_text(encoding="utf-8"))
+    truth = json.loads(truth_of(scene).read_text(encoding="utf-8"))
     run, result = extract(scene, folder, times=times, extra=extra)
     score = None if result is None else evaluate(truth, result)
     return truth, measures(score, run), [] if score is None else [*name_faults(score, truth, result)]
@@ -95,11 +116,7 @@ def parse(argv):
 def main():
     """Print a row a scene, then a row a family."""
     a, extra = parse(sys.argv[1:])
-    lacking = [
-        str(path) for scene in a.scenes for path in (scene, scene.with_suffix(".truth.json")) if not path.is_file()
-    ]
-    if lacking:
-        give_up(f"missing: {', '.join(lacking)}; tests/benchmarks/scenes_make.py makes the scenes")
+    require_scenes(a.scenes)
     bars, families = Bars(), {}
     print_header(*COLUMNS, *(["bar"] if a.min_f1 is not None else []))
     with tempfile.TemporaryDirectory() as folder:
@@ -123,6 +140,7 @@ def main():
                 *written(means(rows)),
                 *([""] if a.min_f1 is not None else []),
             )
+    print_beside_the_prototype(families)
     return bars.exit_code()
 
 
