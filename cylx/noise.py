@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.geometry.morton import BITS, cell_starts, gather_ball
+from cylx.geometry.sorting import sort_in_place
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -242,35 +243,40 @@ def _balls(
     near: IndexArray,
     radius: FloatArray,
 ) -> None:
-    everybody = np.arange(len(points))
     room = np.empty(len(points) if len(points) < 20000 else 20000, np.int64)
+    squares, ordered = np.empty(len(points)), np.empty(len(points))
     for s in range(len(sample)):
         center = points[sample[s]]
-        reach = side
-        found = room
+        reach, found = side, room
         n = gather_ball(points, cells, starts, side, center, reach, found)
         while n <= size:
             reach *= 1.5
             if reach > 12.0 * side:  # far from most others: there are more cells about it than points
-                found, n = everybody, len(points)
+                n, found = len(points), np.empty(len(points), np.int64)
+                for i in range(n):
+                    found[i] = i
             else:
                 n = gather_ball(points, cells, starts, side, center, reach, found)
-        squares = np.empty(n)
         for a in range(n):
             i = found[a]
             squares[a] = (
                 (points[i, 0] - center[0]) ** 2 + (points[i, 1] - center[1]) ** 2 + (points[i, 2] - center[2]) ** 2
             )
-        nearest = np.argsort(squares)
-        for a in range(size + 1):
-            near[s, a] = found[nearest[a]]
-        radius[s] = math.sqrt(squares[nearest[size]])
+            ordered[a] = squares[a]
+        sort_in_place(ordered, n)
+        k = 0
+        for strictly in (True, False):  # of points equally far, those that come first
+            for a in range(n):
+                if k <= size and (squares[a] < ordered[size] if strictly else squares[a] == ordered[size]):
+                    near[s, k] = found[a]
+                    k += 1
+        radius[s] = math.sqrt(ordered[size])
 
 
 def _nearest(
     points: FloatArray, cells: IndexArray, starts: IndexArray, side: float, sample: IndexArray, size: int
 ) -> tuple[IndexArray, FloatArray]:
-    """Give the `size` nearest neighbours of each sample point (itself first), and the distance of the last."""
+    """Give the `size` nearest neighbours of each sample point, itself among them, and the distance of the last."""
     near, radius = np.empty((len(sample), size + 1), np.int64), np.empty(len(sample))
     _balls(points, cells, starts, side, sample, size, near, radius)
     return near, radius

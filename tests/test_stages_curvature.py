@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from cylx.config import CandidatesConfig, Config
 from cylx.records import Candidates
 from cylx.scene import make_frame
-from cylx.stages.curvature import find_curved_windows, window_radii
+from cylx.stages.curvature import find_curved_windows
 from cylx.synthetic import multi, single
 
 ALL_RADII = (0.0, np.inf)
@@ -22,7 +22,8 @@ def frame_of(make, **params):
 
 
 def look(frame, radii=ALL_RADII, threads=1, **changes):
-    return find_curved_windows(frame, radii, CandidatesConfig(**changes), threads)
+    found, explained, report = find_curved_windows(frame, radii, CandidatesConfig(**changes), threads)
+    return found, explained.flatness, report
 
 
 def good(found, frame):
@@ -62,7 +63,7 @@ def test_every_window_is_counted_once():
     assert report.considered == report.kept + sum(report.rejected.values())
     assert report.kept == len(found)
     assert "flat" in report.rejected
-    assert set(np.unique(found.windows)) <= set(window_radii(frame, 1.6))
+    assert set(np.unique(found.windows)) <= set(frame.window_radii(1.6))
     assert len(np.unique(found.parents)) == len(found)  # every window is a parent of its own
 
 
@@ -79,7 +80,7 @@ def test_flatness_is_the_size_of_the_window():
     _, flatness, _ = look(frame)
     # two radii of the larger windows show the curve; a sag of x^2 / 2 is flat within three noises up to x = 0.08
     assert flatness.max() * frame.spacing < 0.5
-    assert set(np.unique(flatness)) <= {0.0, *(2 * radius for radius in window_radii(frame, 1.6))}
+    assert set(np.unique(flatness)) <= {0.0, *(2 * radius for radius in frame.window_radii(1.6))}
 
 
 def test_radii_out_of_range_are_not_proposed():
@@ -102,7 +103,7 @@ def test_threads_make_no_difference():
 @pytest.mark.parametrize("octave", [1.3, 1.6, 3.0])
 def test_windows_grow_by_octaves_to_an_eighth_of_the_cloud(octave):
     frame = frame_of(single, points=2500)
-    radii = window_radii(frame, octave)
+    radii = frame.window_radii(octave)
     assert radii[0] == frame.window
     assert np.allclose(np.divide(radii[1:], radii[:-1]), octave)
     extent = np.linalg.norm(np.ptp(frame.points, axis=0))

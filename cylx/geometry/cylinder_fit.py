@@ -25,6 +25,12 @@ TUKEY_SPREAD = 1.0989
 """Standard deviation of Gaussian residuals over that of the same residuals weighted by the biweight at 4.685."""
 
 
+POLISH_STEPS = 10
+SHARP = 0.34
+"""Largest spread of a polished candidate over its kernel: a Gaussian within it has 0.27 of the width, a uniform
+background 0.378."""
+
+
 class Kernel(NamedTuple):
     """Width of the biweight over the steps of a fit.
 
@@ -122,18 +128,15 @@ def fit_in_place(
     model: FloatArray,
     low: float,
     high: float,
-    start: float,
-    floor: float,
-    decay: float,
-    tuning: float,
-    steps: int,
+    schedule: FloatArray,
     normal: FloatArray,
     right: FloatArray,
     frame: FloatArray,
 ) -> float:
     """Fit `model` = (point, direction, radius), shape (7,), to points[:n] whose height lies in [low, high].
 
-    Heights are measured from the model's point along its direction. `normal` (5, 5), `right` (5,) and `frame` (2, 3)
+    Heights are measured from the model's point along its direction. `schedule` (5,) has what a `Kernel` has, and the
+    most steps. `normal` (5, 5), `right` (5,) and `frame` (2, 3)
     are scratch.
 
     Returns
@@ -141,11 +144,12 @@ def fit_in_place(
     float
         Standard deviation of the weighted residuals at the last step; negative if the fit broke down.
     """
-    width, spread = start, start / 3.0
+    width, floor, decay, tuning = schedule[0], schedule[1], schedule[2], schedule[3]
+    spread = width / 3.0
     row, sums = np.empty(5), np.empty(3)
-    for _ in range(steps):
+    for _ in range(int(schedule[4])):
         _accumulate(points, n, model, low, high, width, normal, right, frame, row, sums)
-        if sums[0] < 8.0 or not solve_in_place(normal, right, 5):
+        if sums[0] < 8.0 or not solve_in_place(normal, right):
             return -1.0
         spread = math.sqrt(sums[1] / sums[0])
         size = _advance(model, right, frame, sums[2])
@@ -186,7 +190,8 @@ def fit_cylinder(
     """
     fitted = np.array(model, dtype=np.float64)
     scratch = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    spread = fit_in_place(points, len(points), fitted, low, high, *kernel, steps, *scratch)
+    schedule = np.array([*kernel, steps], dtype=np.float64)
+    spread = fit_in_place(np.ascontiguousarray(points), len(points), fitted, low, high, schedule, *scratch)
     return None if spread < 0 else (fitted, float(spread))
 
 
@@ -231,6 +236,54 @@ def candidate_quality(
         filled += 1 if bins[a] > 0 else 0
     quality[0], quality[1] = count, highest - lowest if count else 0.0
     quality[2], quality[3] = filled / len(bins), inside
+
+
+@njit(cache=True, nogil=True)
+def polish(
+    points: FloatArray,
+    n: int,
+    model: FloatArray,
+    noise: float,
+    least: float,
+    greatest: float,
+    min_inliers: int,
+    min_share: float,
+    min_extent: float,
+    quality: FloatArray,
+) -> int:
+    """Fit a rough cylinder to the points of its neighbourhood, and say whether it is one.
+
+    Parameters
+    ----------
+    points : ndarray of shape (>= n, 3)
+    n : int
+    model : ndarray of shape (7,)
+        Changed.
+    noise : float
+    least, greatest : float
+        Radius it may have.
+    min_inliers, min_share, min_extent
+        What must support it: points, their share of all, and the length along the axis.
+    quality : ndarray of shape (5,)
+        Filled by `candidate_quality`, and with the spread.
+
+    Returns
+    -------
+    int
+        2 if it does, 1 if it is badly supported, 0 if it does not fit.
+    """
+    matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
+    bins, schedule = np.empty(36, np.int64), np.empty(5)
+    floor = max(3.0 * noise, 0.01 * model[6])
+    schedule[0], schedule[1], schedule[2] = max(0.3 * model[6], 4.0 * noise), floor, 0.6
+    schedule[3], schedule[4] = math.inf, POLISH_STEPS
+    spread = fit_in_place(points, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
+    if spread < 0.0 or spread > SHARP * floor or not (least <= model[6] <= greatest):
+        return 0
+    candidate_quality(points, n, model, 3.0 * noise, frame, bins, quality)
+    quality[4] = spread
+    supported = quality[0] >= min_inliers and quality[0] >= min_share * n and quality[1] >= min_extent
+    return 2 if supported else 1
 
 
 @njit(cache=True, nogil=True)

@@ -230,7 +230,7 @@ def search_conic(
             x, y = points[samples[k, i], 0], points[samples[k, i], 1]
             matrix[i, 0], matrix[i, 1], matrix[i, 2], matrix[i, 3], matrix[i, 4] = x * x, x * y, y * y, x, y
             right[i] = -1.0
-        if not solve_in_place(matrix, right, 5):
+        if not solve_in_place(matrix, right):
             continue
         a, b, c, d, e = right[0], right[1], right[2], right[3], right[4]
         det = 4.0 * a * c - b * b

@@ -9,6 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.geometry.small_matrices import fill_frame
+from cylx.geometry.sorting import median_of_positive, sort_in_place
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -91,36 +92,6 @@ def fill_coordinates(
 
 
 @njit(cache=True, nogil=True)
-def sort_in_place(values: FloatArray, n: int) -> None:
-    """Sort values[:n], ascending: Shell's method with Ciura's gaps, quick to compile."""
-    gap = 1
-    while gap < n // 3:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for i in range(gap, n):
-            value, j = values[i], i
-            while j >= gap and values[j - gap] > value:
-                values[j] = values[j - gap]
-                j -= gap
-            values[j] = value
-        gap //= 3
-
-
-@njit(cache=True, nogil=True)
-def _median_of_positive(values: FloatArray, n: int, scratch: FloatArray) -> float:
-    """Give the median of those of values[:n] that are positive; 0 if there are none."""
-    m = 0
-    for i in range(n):
-        if values[i] > 0.0:
-            scratch[m] = values[i]
-            m += 1
-    if m == 0:
-        return 0.0
-    sort_in_place(scratch, m)
-    return float(0.5 * (scratch[(m - 1) // 2] + scratch[m // 2]))
-
-
-@njit(cache=True, nogil=True)
 def _find_ends(
     heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float, ends: FloatArray
 ) -> bool:
@@ -133,8 +104,8 @@ def _find_ends(
             core += 1
     if core < LEAST:
         return False
-    least = max(0.5, 0.15 * _median_of_positive(counts, ARC_BINS, scratch))
-    width, on = 0, 0.0
+    least = max(0.5, 0.15 * median_of_positive(counts, len(counts), scratch))
+    width, on = np.int64(0), 0.0
     for b in range(ARC_BINS):
         if counts[b] > least:
             arc[b] = True
@@ -184,12 +155,12 @@ def _choose_run(
     shares: FloatArray, pieces: int, piece: float, first: float, half: float, filled: float, bridge: float
 ) -> tuple[int, int]:
     """Give first and last piece of the run of filled ones that overlaps the known height most; gaps are bridged."""
-    inside, scratch, n = np.empty(pieces), np.empty(pieces), 0
+    inside, scratch, n = np.empty(pieces), np.empty(pieces), np.int64(0)
     for p in range(pieces):
         if abs((first + p + 0.5) * piece) <= half + 0.5 * piece:
             inside[n] = shares[p]
             n += 1
-    usual = _median_of_positive(inside, n, scratch)
+    usual = median_of_positive(inside, n, scratch)
     if usual == 0.0:
         usual = 1.0
     best, start, stop, last, most = -1, -1, -1, -1, -math.inf
@@ -224,7 +195,7 @@ def _set_ends(
             count += 1
     gap = (high - low) / max(count, 1)
     for side in range(2):
-        n = 0
+        n = np.int64(0)
         for i in range(len(heights)):
             depth = heights[i] - low if side == 0 else high - heights[i]
             if 0.0 <= depth < margin and low <= heights[i] < high and arc[_bin(angles[i])]:

@@ -132,7 +132,7 @@ def osculating_cylinder(
         for a in range(6):
             for b in range(a + 1, 6):
                 gram[a, b] = gram[b, a]
-        if not solve_in_place(gram, terms, 6):
+        if not solve_in_place(gram, terms):
             return False
         total, count = 0.0, 0
         for i in range(n):

@@ -12,8 +12,8 @@ FloatArray = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def solve_in_place(matrix: FloatArray, right: FloatArray, n: int) -> bool:
-    """Solve the leading n x n system by elimination with partial pivoting; the solution replaces `right`.
+def solve_in_place(matrix: FloatArray, right: FloatArray) -> bool:
+    """Solve the leading n x n system, n = len(right), by elimination with pivoting; the solution replaces `right`.
 
     Parameters
     ----------
@@ -21,15 +21,13 @@ def solve_in_place(matrix: FloatArray, right: FloatArray, n: int) -> bool:
         Overwritten.
     right : ndarray of shape (>= n,)
         Overwritten with the solution.
-    n : int
-        Size of the system.
 
     Returns
     -------
     bool
         False if the matrix is singular to working precision.
     """
-    largest = 0.0
+    n, largest = len(right), 0.0
     for i in range(n):
         largest = max(largest, abs(matrix[i, i]))
     for i in range(n):

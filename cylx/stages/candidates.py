@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
-from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place, move_to_foot
+from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
 
@@ -127,9 +127,7 @@ def _polish(
     kept: NDArray[np.bool_],
 ) -> None:
     found, around = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3))
-    matrix, right, axes = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    quality, bins = np.empty(4), np.empty(36, np.int64)
-    center = np.empty(3)
+    quality, center = np.empty(5), np.empty(3)
     for c in range(len(rows)):
         model = rows[c, :7]
         first = model[6]
@@ -140,19 +138,8 @@ def _polish(
         for a in range(n):
             for d in range(3):
                 around[a, d] = points[found[a], d] - center[d]
-        floor = max(3.0 * noise, 0.01 * first)
-        spread = fit_in_place(
-            around, n, model, -math.inf, math.inf, max(0.3 * first, 4.0 * noise), floor, 0.6, math.inf, 10, matrix,
-            right, axes
-        )  # fmt: skip
-        if (
-            spread < 0.0
-            or spread > 0.34 * floor
-            or not (max(least, 0.5 * first) <= model[6] <= min(greatest, 2.0 * first))
-        ):
-            continue
-        candidate_quality(around, n, model, 3.0 * noise, axes, bins, quality)
-        if quality[0] < min_inliers or quality[0] < min_share * n or quality[1] < 0.5 * model[6]:
+        low, high = max(least, 0.5 * first), min(greatest, 2.0 * first)
+        if polish(around, n, model, noise, low, high, min_inliers, min_share, 0.5 * first, quality) < 2:
             continue
         move_to_foot(model, center)
         rows[c, 7], rows[c, 8] = quality[0], quality[1]

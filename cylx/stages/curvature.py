@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
-from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place, move_to_foot
+from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
 from cylx.geometry.small_matrices import fill_frame
@@ -33,8 +33,8 @@ FLAT_SHARE = 0.9
 """Share of a window's points within three noises of its plane that makes it flat."""
 OUTCOMES = ("too few points", "flat", "no curvature", "does not fit", "badly supported", "kept")
 LEAST_POINTS = 25
-COLUMNS = 10
-"""Numbers a window fills in: the model (7), inliers, extent, spread."""
+COLUMNS = 9
+"""Numbers a window fills in: the model (7), inliers, extent."""
 
 
 def find_curved_windows(
@@ -151,7 +151,7 @@ def _scan(
     plane, heights = np.empty((2, 3)), np.empty(CAPACITY)
     matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
     right, axes = np.empty(6), np.empty((2, 3))
-    quality, bins = np.empty(4), np.empty(36, np.int64)
+    quality = np.empty(5)
     for s in range(len(seeds)):
         seed, model, noise = points[seeds[s]], rows[s, :7], noises[s]
         n = gather_ball(points, cells, starts, side, seed, 2.0 * radius, found)
@@ -172,23 +172,13 @@ def _scan(
         if not (max(0.35 * radius, 4.0 * noise) <= model[6] <= 14.0 * radius):
             continue
         outcome[s] = 3
-        start, floor = max(0.3 * model[6], 4.0 * noise), max(3.0 * noise, 0.01 * model[6])
-        spread = fit_in_place(
-            around, n, model, -math.inf, math.inf, start, floor, 0.6, math.inf, 10, matrix, right, axes
-        )
-        # a Gaussian within the kernel has 0.27 of its width, a uniform background 0.378
-        if spread < 0.0 or spread > 0.34 * floor:
+        low, high = max(0.3 * radius, 4.0 * noise, least), min(16.0 * radius, greatest)
+        outcome[s] += polish(around, n, model, noise, low, high, min_inliers, min_share, 0.8 * radius, quality)
+        if outcome[s] < 5:
             continue
-        if not (max(0.3 * radius, 4.0 * noise, least) <= model[6] <= min(16.0 * radius, greatest)):
-            continue
-        outcome[s] = 4
-        candidate_quality(around, n, model, 3.0 * noise, axes, bins, quality)
-        if quality[0] < min_inliers or quality[0] < min_share * n or quality[1] < 0.8 * radius:
-            continue
-        outcome[s] = 5
         _mark_explained(around, found, n, model, 3.0 * noise, axes, marks)
         move_to_foot(model, seed)
-        rows[s, 7], rows[s, 8], rows[s, 9] = quality[0], quality[1], spread
+        rows[s, 7], rows[s, 8] = quality[0], quality[1]
 
 
 @njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cylx.config import SlicingConfig
 from cylx.geometry.circle import search_circle
-from cylx.geometry.cylinder_fit import candidate_quality, fit_in_place, move_to_foot
+from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.ellipse import conic_shape, search_conic
 from cylx.geometry.lines import fit_line
 from cylx.geometry.morton import gather_ball
@@ -169,7 +169,7 @@ def _slice_windows(
     found, around = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3))
     flat, samples = np.empty((CAPACITY, 2)), np.empty((SAMPLES, 5), np.int64)
     model, normal, frame = np.empty(7), np.empty(3), np.empty((2, 3))
-    shape, conic = np.empty(5), np.empty(6)
+    shape, quality = np.empty(5), np.empty(5)
     for s in range(len(seeds)):
         seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1
         for _ in range(4):
@@ -205,21 +205,16 @@ def _slice_windows(
                 for d in range(5):
                     state = _draw(state)
                     samples[k, d] = (state >> 20) % m
-            tolerance = 3.0 * noise + (0.02 * reach if p == 0 else 0.06 * thick)
-            if p == 0:
-                support = search_circle(flat[:m], samples, tolerance, least, greatest, shape)
-            else:
-                support = search_conic(flat[:m], samples, tolerance, least, greatest, 3.0, conic)
-                support = support if support > 0.0 and conic_shape(conic, shape) else 0.0
-            if support < 0.5 * FEWEST or support < 0.25 * m:
+            if not _find_shape(flat[:m], samples, noise, reach, p == 0, least, greatest, shape):
                 counts[2] += 1
                 continue
             fits = False
             for turn in range(1 if p == 0 else 2):
                 _set_model(normal, offset, frame, shape, 1.0 if turn == 0 else -1.0, model)
-                quality = _polish(around, n, model, noise, radius_range, supported)
-                if quality[0] > 0.0:
-                    fits = True
+                low, high = max(radius_range[0], 0.5 * model[6]), min(radius_range[1], 2.0 * model[6])
+                if polish(around, n, model, noise, low, high, supported[0], supported[1], 0.5 * low, quality) < 2:
+                    continue
+                fits = True
                 if quality[0] > best:
                     best = quality[0]
                     move_to_foot(model, seed)
@@ -227,6 +222,29 @@ def _slice_windows(
                         rows[s, d] = model[d]
                     rows[s, 7], rows[s, 8] = quality[0], quality[1]
             counts[3] += 0 if fits else 1
+
+
+@njit(cache=True, nogil=True)
+def _find_shape(
+    flat: FloatArray,
+    samples: IndexArray,
+    noise: float,
+    reach: float,
+    across: bool,
+    least: float,
+    greatest: float,
+    shape: FloatArray,
+) -> bool:
+    """Fill in the ellipse of a slice, a circle if it lies across a cylinder; False if few points support one."""
+    if across:
+        support = search_circle(flat, samples, 3.0 * noise + 0.02 * reach, least, greatest, shape)
+    else:
+        conic = np.empty(6)
+        tolerance = 3.0 * noise + 0.06 * THICKNESS * reach
+        support = search_conic(flat, samples, tolerance, least, greatest, 3.0, conic)
+        if support > 0.0 and not conic_shape(conic, shape):
+            return False
+    return support >= 0.5 * FEWEST and support >= 0.25 * len(flat)
 
 
 @njit(cache=True, nogil=True)
@@ -268,28 +286,3 @@ def _set_model(
         model[d] = shape[0] * frame[0, d] + shape[1] * frame[1, d] + offset * normal[d]
         model[3 + d] = cosine * normal[d] + sine * (along * frame[0, d] + across * frame[1, d])
     model[6] = shape[3]
-
-
-@njit(cache=True, nogil=True)
-def _polish(
-    points: FloatArray,
-    n: int,
-    model: FloatArray,
-    noise: float,
-    radius_range: tuple[float, float],
-    supported: tuple[int, float],
-) -> FloatArray:
-    """Fit a cylinder to its window; give inliers and extent, zeros if it does not fit."""
-    matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    quality, bins, first = np.zeros(4), np.empty(36, np.int64), model[6]
-    floor = max(3.0 * noise, 0.01 * first)
-    start = max(0.3 * first, 4.0 * noise)
-    spread = fit_in_place(points, n, model, -math.inf, math.inf, start, floor, 0.6, math.inf, 10, matrix, right, frame)
-    if spread < 0.0 or spread > 0.34 * floor:
-        return quality
-    if not (max(radius_range[0], 0.5 * first) <= model[6] <= min(radius_range[1], 2.0 * first)):
-        return quality
-    candidate_quality(points, n, model, 3.0 * noise, frame, bins, quality)
-    if quality[0] < supported[0] or quality[0] < supported[1] * n or quality[1] < 0.5 * model[6]:
-        quality[0] = 0.0
-    return quality
