@@ -35,7 +35,10 @@ MAY_IMPORT = {
     "game": set(),
     "errors": set(),
 }
-OWN_SECTION = {"curvature": "CandidatesConfig"}  # the others are called after their file
+OWN_SECTION = {
+    "curvature": "CandidatesConfig",
+    "local_slices": "SlicingConfig",
+}  # the others are called after their file
 ONLY_IN = {
     "click": "cli",
     "laspy": "io",

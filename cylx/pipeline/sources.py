@@ -51,10 +51,10 @@ def ellipses_of_slices(
     thickness = (config.slicing.thickness or 0.0) / frame.spacing
     tolerance = (config.ellipses.tolerance or 0.0) / frame.spacing
     # points of large flat windows are explained already; the paper's preset has none
-    eligible = flatness < LARGE * frame.window if flatness.any() else None
+    eligible = frame.points[flatness < LARGE * frame.window] if flatness.any() else frame.points
 
     def work(index: int) -> list[EllipseFit] | None:
-        section = cut_slice(frame, planes[index], thickness, eligible)
+        section = cut_slice(eligible, planes[index], thickness)
         if len(section.points) < config.slicing.min_points:
             return None
         return fit_ellipses(

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from cylx.config import EllipsesConfig
 from cylx.geometry.ellipse import Degenerate, search_ellipse
@@ -88,9 +87,22 @@ def split_pieces(points: FloatArray, link: float) -> list[IndexArray]:
         hit = np.flatnonzero(keys[np.minimum(place, len(keys) - 1)] == keys + step)
         rows.append(hit)
         columns.append(place[hit])
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    graph = coo_array((np.ones(len(row)), (row, column)), shape=(len(keys), len(keys)))
-    count, label = connected_components(graph, directed=False)
-    piece = label[owner]
+    roots = np.arange(len(keys))
+    _join(np.concatenate(rows), np.concatenate(columns), roots)
+    piece = np.unique(roots, return_inverse=True)[1][owner]
     order = np.argsort(piece, kind="stable")
-    return [np.asarray(part) for part in np.split(order, np.cumsum(np.bincount(piece, minlength=count))[:-1])]
+    return [np.asarray(part) for part in np.split(order, np.cumsum(np.bincount(piece))[:-1])]
+
+
+@njit(cache=True, nogil=True)
+def _join(rows: IndexArray, columns: IndexArray, roots: IndexArray) -> None:
+    """Give all nodes that edges connect the least of them as their root: union and find."""
+    for e in range(len(rows)):
+        a, b = rows[e], columns[e]
+        while roots[a] != a:
+            a = roots[a]
+        while roots[b] != b:
+            b = roots[b]
+        roots[max(a, b)] = min(a, b)
+    for i in range(len(roots)):
+        roots[i] = roots[roots[i]]

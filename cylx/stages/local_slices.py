@@ -181,19 +181,15 @@ def _slice_windows(
             for d in range(3):
                 around[a, d] = points[found[a], d] - seed[d]
         least, greatest = max(radius_range[0], 4.0 * noise), min(radius_range[1], 0.75 * reach)
-        best = 0.0
+        rows[s, 7] = 0.0
         for p in range(planes + 1):
             counts[0] += 1
             # the first one across the longest direction, as thick as the window; then in all directions
-            thick = math.inf if p == 0 else THICKNESS * reach
-            offset = 0.0
+            thick, offset = THICKNESS * reach, 0.0
             if p == 0:
-                if fit_line(around, n, normal) > SLIM:
-                    counts[1] += 1
-                    continue
+                thick = math.inf if fit_line(around, n, normal) < SLIM else 0.0
             else:
-                state = _fill_normal(state, normal)
-                state = _draw(state)
+                state = _draw(_fill_normal(state, normal))
                 k = (state >> 20) % n
                 offset = around[k, 0] * normal[0] + around[k, 1] * normal[1] + around[k, 2] * normal[2]
             fill_frame(normal, frame)
@@ -201,10 +197,7 @@ def _slice_windows(
             if m < FEWEST:
                 counts[1] += 1
                 continue
-            for k in range(SAMPLES):
-                for d in range(5):
-                    state = _draw(state)
-                    samples[k, d] = (state >> 20) % m
+            state = _fill_samples(state, m, samples)
             if not _find_shape(flat[:m], samples, noise, reach, p == 0, least, greatest, shape):
                 counts[2] += 1
                 continue
@@ -212,16 +205,23 @@ def _slice_windows(
             for turn in range(1 if p == 0 else 2):
                 _set_model(normal, offset, frame, shape, 1.0 if turn == 0 else -1.0, model)
                 low, high = max(radius_range[0], 0.5 * model[6]), min(radius_range[1], 2.0 * model[6])
-                if polish(around, n, model, noise, low, high, supported[0], supported[1], 0.5 * low, quality) < 2:
-                    continue
-                fits = True
-                if quality[0] > best:
-                    best = quality[0]
+                fit = polish(around, n, model, noise, low, high, supported[0], supported[1], 0.5 * low, quality)
+                fits = fits or fit == 2
+                if fit == 2 and quality[0] > rows[s, 7]:
                     move_to_foot(model, seed)
-                    for d in range(7):
-                        rows[s, d] = model[d]
+                    rows[s, :7] = model
                     rows[s, 7], rows[s, 8] = quality[0], quality[1]
             counts[3] += 0 if fits else 1
+
+
+@njit(cache=True, nogil=True)
+def _fill_samples(state: int, count: int, samples: IndexArray) -> int:
+    """Draw samples of five out of so many; give the next state."""
+    for k in range(len(samples)):
+        for d in range(5):
+            state = _draw(state)
+            samples[k, d] = (state >> 20) % count
+    return state
 
 
 @njit(cache=True, nogil=True)

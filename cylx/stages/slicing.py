@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import SlicingConfig
@@ -34,23 +35,32 @@ def draw_planes(frame: Frame, config: SlicingConfig, seed: int) -> list[Plane]:
     return [Plane(center, normal) for center, normal in zip(centers, normals, strict=True)]
 
 
-def cut_slice(frame: Frame, plane: Plane, thickness: float, eligible: NDArray[np.bool_] | None) -> Slice:
+def cut_slice(points: FloatArray, plane: Plane, thickness: float) -> Slice:
     """Collect the points within half the thickness of a plane, projected along its normal.
 
     Parameters
     ----------
-    frame : Frame
+    points : ndarray of shape (N, 3)
     plane : Plane
     thickness : float
         Full thickness, frame units.
-    eligible : ndarray of shape (N,), bool, or None
-        Points that may be taken; all by default.
 
     Returns
     -------
     Slice
     """
-    close = np.abs(frame.points @ plane.normal - plane.point @ plane.normal) < 0.5 * thickness
-    if eligible is not None:
-        close &= eligible
-    return Slice(plane, plane.project(frame.points[close]))
+    close = np.empty(len(points), np.int64)
+    n = _find_close(points, plane.normal, float(plane.point @ plane.normal), 0.5 * thickness, close)
+    return Slice(plane, plane.project(points[close[:n]]))
+
+
+@njit(cache=True, nogil=True)
+def _find_close(points: FloatArray, normal: FloatArray, offset: float, width: float, close: NDArray[np.int64]) -> int:
+    """Fill in the indices of the points near a plane; count them."""
+    n = 0
+    for i in range(len(points)):
+        height = points[i, 0] * normal[0] + points[i, 1] * normal[1] + points[i, 2] * normal[2] - offset
+        if abs(height) < width:
+            close[n] = i
+            n += 1
+    return n

@@ -1,0 +1,94 @@
+"""The scatter of small pieces of surface about their quadrics."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+MAD_SHRINKAGE = 0.93
+"""What the median absolute deviation of 48 quadric residuals shows of a Gaussian's standard deviation, as a share."""
+
+
+def half_sample_mode(values: FloatArray) -> float:
+    """Give the mode of positive values: the half-sample mode of their logarithms.
+
+    Parameters
+    ----------
+    values : ndarray of shape (n,)
+        Positive, n >= 1.
+
+    References
+    ----------
+    D. R. Bickel and R. Fruehwirth, On a fast, robust estimator of the mode, CSDA 50 (2006).
+    """
+    logs = np.sort(np.log(values))
+    while len(logs) > 3:
+        half = len(logs) // 2 + 1
+        start = int(np.argmin(logs[half - 1 :] - logs[: len(logs) - half + 1]))
+        logs = logs[start : start + half]
+    return float(np.exp(logs.mean()))
+
+
+def quadric_spread(patches: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Fit a quadric over the plane of each patch by least squares.
+
+    Parameters
+    ----------
+    patches : ndarray of shape (m, k, 3)
+
+    Returns
+    -------
+    deviations, widths : ndarray of shape (m,)
+        Standard deviation of the residuals, k - 6 degrees of freedom; in-plane root mean square.
+    """
+    design, height, width = _over_own_plane(patches)
+    residuals = _residuals(design, height, np.ones_like(height))
+    count = patches.shape[1]
+    return np.sqrt((residuals**2).mean(axis=1) * count / (count - 6)), width
+
+
+def core_spread(patches: FloatArray) -> FloatArray:
+    """Give the scatter of the core of each patch about its quadric, by the median: outliers move it little."""
+    design, height, _ = _over_own_plane(patches)
+    weights = np.ones_like(height)
+    residuals = height
+    for _ in range(8):  # least absolute residuals first, then the core about them
+        residuals = _residuals(design, height, weights)
+        size = np.abs(residuals)
+        weights = 1.0 / np.maximum(size, 0.1 * np.median(size, axis=1, keepdims=True) + 1e-300)
+    core = np.ones_like(height, dtype=np.bool_)
+    for _ in range(4):
+        core = np.abs(residuals) <= 2.5 * 1.4826 * _masked_median(np.abs(residuals), core)
+        residuals = _residuals(design, height, core.astype(np.float64))
+    freedom = np.sqrt(core.sum(axis=1) / np.maximum(core.sum(axis=1) - 6, 1))
+    return np.asarray(1.4826 * _masked_median(np.abs(residuals), core)[:, 0] * freedom)
+
+
+def _over_own_plane(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Give design matrix (m, k, 6), heights (m, k) and in-plane rms (m,) of patches over their principal planes."""
+    offsets = patches - patches.mean(axis=1, keepdims=True)
+    _, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", offsets, offsets))
+    height, x, y = (np.einsum("mki,mi->mk", offsets, axes[:, :, a]) for a in (0, 1, 2))
+    width = np.sqrt((x * x + y * y).mean(axis=1))
+    scale = np.where(width > 0, width, 1.0)[:, None]
+    x, y = x / scale, y / scale
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1), height, width
+
+
+def _residuals(design: FloatArray, height: FloatArray, weights: FloatArray) -> FloatArray:
+    """Give the residuals of one weighted least-squares fit a patch: design (m, k, 6), height and weights (m, k)."""
+    weighted = design * weights[..., None]
+    gram = weighted.transpose(0, 2, 1) @ design
+    gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(6)
+    terms = np.linalg.solve(gram, weighted.transpose(0, 2, 1) @ height[..., None])
+    return np.asarray(height - (design @ terms)[..., 0], dtype=np.float64)
+
+
+def _masked_median(values: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
+    """Give the median of the masked values of each row, shape (m, 1); each row has some."""
+    ordered = np.sort(np.where(mask, values, np.inf), axis=1)
+    count = np.maximum(mask.sum(axis=1, keepdims=True), 1)
+    low, high = (np.take_along_axis(ordered, half, axis=1) for half in ((count - 1) // 2, count // 2))
+    return np.asarray(0.5 * (low + high), dtype=np.float64)

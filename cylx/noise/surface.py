@@ -1,0 +1,153 @@
+"""Spacing and noise of a cloud, read off small pieces of its surfaces."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.geometry.morton import BITS, cell_starts, gather_ball
+from cylx.geometry.sorting import sort_in_place
+from cylx.noise.patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+SAMPLE = 3000
+"""Neighbourhoods looked at; the mode of their noise then scatters by about 4 %."""
+NEIGHBOURS = (48, 96, 192)
+"""Sizes of a neighbourhood: the next is taken where the patch is not wide against its thickness."""
+WIDE = 4.0
+"""A patch is wide if its in-plane rms exceeds its thickness this many times."""
+FLAT = 8.0
+"""A patch says something of the noise of its place if it is wide this many times: what is thicker may be no surface."""
+
+
+class Patches(NamedTuple):
+    """Small pieces of surface.
+
+    Parameters
+    ----------
+    middles : ndarray of shape (m,)
+        Index of the point each was taken about.
+    deviations : ndarray of shape (m,)
+        Standard deviations about their quadrics.
+    """
+
+    middles: IndexArray
+    deviations: FloatArray
+
+
+def measure_surface(
+    points: FloatArray, codes: IndexArray, unit: float, rng: np.random.Generator
+) -> tuple[float, float, float, Patches]:
+    """Measure how far apart the points of a cloud lie and how far they scatter about their surfaces.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+        In Morton order, from zero.
+    codes : ndarray of shape (N,)
+    unit : float
+        Side of the smallest cell.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    spacing, dense, noise : float
+        Median spacing, spacing of the densest tenth, standard deviation about the surface.
+    patches : Patches
+        Where what was measured.
+    """
+    sample = np.sort(rng.choice(len(points), min(SAMPLE, len(points)), replace=False))
+    level = 0
+    while level < BITS and len(codes) < 24 * np.count_nonzero(np.diff(codes >> (3 * level))) + 24:
+        level += 1
+    cells, starts = cell_starts(codes, level)
+    spread = np.full(len(sample), np.nan)
+    deviation = np.full(len(sample), np.nan)
+    spacing = np.full(len(sample), np.nan)
+    flat = np.zeros(len(sample), np.bool_)
+    for count in NEIGHBOURS:
+        todo = np.flatnonzero(np.isnan(spread))
+        size = min(count, len(points) - 1)
+        if len(todo) == 0:
+            break
+        if size < 9:
+            continue
+        near, radius = _nearest(points, cells, starts, unit * 2.0**level, sample[todo], size)
+        sd, width = quadric_spread(points[near])
+        wide = width > WIDE * sd
+        spread[todo[wide]] = sd[wide]
+        flat[todo[wide]] = width[wide] > FLAT * sd[wide]
+        third = np.flatnonzero(wide)[::3] if wide.any() else np.arange(0, len(todo), 3)
+        deviation[todo[third]] = core_spread(points[near[third]])
+        fresh = np.isnan(spacing[todo])
+        spacing[todo[fresh]] = (radius * math.sqrt(math.pi / size))[fresh]
+    known = np.isfinite(spacing) & (spacing > 0)
+    if not known.any():  # a handful of points: their extent is all there is to go by
+        guess = float(np.linalg.norm(np.ptp(points, axis=0))) / math.sqrt(len(points))
+        return guess, guess, 0.1 * guess, Patches(np.empty(0, np.int64), np.empty(0))
+    typical, dense = np.quantile(spacing[known], [0.5, 0.1])
+    good = np.isfinite(spread) & (spread > 1e-9 * typical)
+    clear = good & flat
+    cores = deviation[np.isfinite(deviation)]
+    noise = 1e-3 * typical  # noise-free surfaces still have a scale below which nothing is told apart
+    if good.any():
+        plain, robust = half_sample_mode(spread[good]), half_sample_mode(cores + 1e-12 * typical)
+        # heavy outliers blow up the plain estimate alone
+        noise = max(noise, robust / MAD_SHRINKAGE if robust < 0.85 * MAD_SHRINKAGE * plain else plain)
+    return float(typical), float(dense), float(noise), Patches(sample[clear], spread[clear])
+
+
+@njit(cache=True, nogil=True)
+def _balls(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    sample: IndexArray,
+    size: int,
+    near: IndexArray,
+    radius: FloatArray,
+) -> None:
+    room = np.empty(len(points) if len(points) < 20000 else 20000, np.int64)
+    squares, ordered = np.empty(len(points)), np.empty(len(points))
+    for s in range(len(sample)):
+        center = points[sample[s]]
+        reach, found = side, room
+        n = gather_ball(points, cells, starts, side, center, reach, found)
+        while n <= size:
+            reach *= 1.5
+            if reach > 12.0 * side:  # far from most others: there are more cells about it than points
+                n, found = len(points), np.empty(len(points), np.int64)
+                for i in range(n):
+                    found[i] = i
+            else:
+                n = gather_ball(points, cells, starts, side, center, reach, found)
+        for a in range(n):
+            i = found[a]
+            squares[a] = (
+                (points[i, 0] - center[0]) ** 2 + (points[i, 1] - center[1]) ** 2 + (points[i, 2] - center[2]) ** 2
+            )
+            ordered[a] = squares[a]
+        sort_in_place(ordered, n)
+        k = 0
+        for strictly in (True, False):  # of points equally far, those that come first
+            for a in range(n):
+                if k <= size and (squares[a] < ordered[size] if strictly else squares[a] == ordered[size]):
+                    near[s, k] = found[a]
+                    k += 1
+        radius[s] = math.sqrt(ordered[size])
+
+
+def _nearest(
+    points: FloatArray, cells: IndexArray, starts: IndexArray, side: float, sample: IndexArray, size: int
+) -> tuple[IndexArray, FloatArray]:
+    """Give the `size` nearest neighbours of each sample point, itself among them, and the distance of the last."""
+    near, radius = np.empty((len(sample), size + 1), np.int64), np.empty(len(sample))
+    _balls(points, cells, starts, side, sample, size, near, radius)
+    return near, radius

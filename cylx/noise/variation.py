@@ -1,0 +1,124 @@
+"""Where and over what sizes the noise of a cloud differs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.geometry.morton import BITS, cell_starts, gather_ball
+from cylx.noise.patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+AGREED = 16
+"""Patches that a cell needs to say something of its own noise."""
+PIECES, PATCH = 600, 64
+"""Larger pieces looked at, and the points of each."""
+
+
+def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tuple[float, IndexArray, FloatArray]:
+    """Measure where the noise exceeds the usual one: in cells that hold enough patches most of which agree.
+
+    Parameters
+    ----------
+    places : ndarray of shape (m, 3)
+        Of patches, from zero.
+    ratios : ndarray of shape (m,)
+        Standard deviations of the patches over the usual one.
+    extent : float
+        Side of the cube that holds the cloud.
+
+    Returns
+    -------
+    side : float
+        Of the cells.
+    cells : ndarray of shape (C, 3), int64
+        Those of which something is known; none if it is the same everywhere.
+    factors : ndarray of shape (C,)
+        How many times the usual noise there is.
+    """
+    none = np.empty((0, 3), np.int64), np.empty(0)
+    side = 1.01 * extent
+    while len(places) >= AGREED:
+        corner = np.floor(places / (0.5 * side)).astype(np.int64)
+        cells, owner = np.unique(corner, axis=0, return_inverse=True)
+        if len(places) < 2 * AGREED * len(cells):
+            break
+        side *= 0.5
+    corner = np.floor(places / side).astype(np.int64)
+    cells, owner = np.unique(corner, axis=0, return_inverse=True)
+    factors, known = np.ones(len(cells)), np.zeros(len(cells), np.bool_)
+    for c in range(len(cells)):
+        own = ratios[owner.ravel() == c]
+        if len(own) < AGREED:
+            continue
+        mode = half_sample_mode(own)
+        known[c] = (np.abs(np.log(own / mode)) < 0.3).mean() >= 0.6
+        # what is less may be the scatter of the estimate; and a quiet floor says nothing of what stands on it
+        factors[c] = mode if known[c] and mode > 1.3 else 1.0
+    if not (factors != 1.0).any():
+        return side, *none
+    return side, cells[known], factors[known]
+
+
+def noise_by_size(
+    points: FloatArray, codes: IndexArray, unit: float, spacing: float, noise: float, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray]:
+    """Measure the noise over larger and larger flat pieces, as long as there are such and most of them agree.
+
+    The residuals of curved pieces show their shape as soon as they are large; those of flat ones show noise at any
+    size.
+    """
+    sizes, deviations = [4.0 * spacing], [noise]
+    while len(sizes) < 5:
+        size = 2.0 * sizes[-1]
+        level = min(BITS, max(0, math.floor(math.log2(size / unit))))
+        cells, starts = cell_starts(codes, level)
+        sample = np.sort(rng.choice(len(points), min(PIECES, len(points)), replace=False))
+        patches = np.empty((len(sample), PATCH, 3))
+        full = np.zeros(len(sample), np.bool_)
+        _fill_patches(points, cells, starts, unit * 2.0**level, sample, size, patches, full)
+        if full.mean() < 0.5:
+            break
+        sd, width = quadric_spread(patches[full])
+        value = np.maximum(np.minimum(sd, core_spread(patches[full]) / MAD_SHRINKAGE), 1e-12 * spacing)
+        covariance = np.einsum("mki,mkj->mij", *2 * (patches[full] - patches[full].mean(axis=1, keepdims=True),))
+        thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 0], 0.0) / PATCH)
+        flat = (value < width / 8.0) & (thickness < 2.0 * value)
+        if flat.sum() < max(20, 0.15 * len(flat)):
+            break
+        mode = half_sample_mode(value[flat])
+        if (np.abs(np.log(value[flat] / mode)) < 0.3).mean() < 0.4:
+            break
+        sizes.append(size)
+        deviations.append(min(max(mode, deviations[-1]), 2.0 * deviations[-1]))
+    # a tenth is the scatter of the estimate itself
+    grown = np.where(np.array(deviations) > 1.15 * noise, deviations, noise)
+    return np.array(sizes), np.maximum.accumulate(grown)
+
+
+@njit(cache=True, nogil=True)
+def _fill_patches(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    sample: IndexArray,
+    size: float,
+    patches: FloatArray,
+    full: NDArray[np.bool_],
+) -> None:
+    """Fill each patch with points evenly picked from the ball about a sample point, if it holds enough of them."""
+    found = np.empty(40000, np.int64)
+    count = patches.shape[1]
+    for s in range(len(sample)):
+        n = gather_ball(points, cells, starts, side, points[sample[s]], size, found)
+        full[s] = n >= count
+        if full[s]:
+            for a in range(count):
+                for d in range(3):
+                    patches[s, a, d] = points[found[(a * n) // count], d]
