@@ -86,14 +86,15 @@ def local_payoff(
         exp(-sqrt((angle / a)^2 + (offset / o)^2 + ((1 - ratio) / p)^2)) where it exceeds 0.1, else nothing.
     """
     least_ratio = max(min_ratio, 1.0 + math.log(CUT) * radius)
-    # by bins of the radius, of which only neighbours can be compatible, and along x within a bin
-    bins = np.floor(np.log(models[:, 6]) / -math.log(least_ratio)).astype(np.int64)
-    order = np.lexsort((models[:, 0], bins)).astype(np.int64)
-    sorted_models = np.ascontiguousarray(models[order])
-    extents = extents[order]
-    bins, starts = np.unique(bins[order], return_index=True)
+    # by bins of the radius, of which only neighbours can be compatible, and of the reach; along x within a bin
+    reaches = np.maximum(REACH * models[:, 6], extents)
+    radius_bins = np.floor(np.log(models[:, 6]) / -math.log(least_ratio)).astype(np.int64)
+    keys = (radius_bins << 12) + np.floor(np.log2(reaches)).astype(np.int64) + 2048
+    order = np.lexsort((models[:, 0], keys)).astype(np.int64)
+    bins, starts = np.unique(keys[order], return_index=True)
     starts = np.append(starts, len(order)).astype(np.int64)
-    table = sorted_models, order, parents[order], extents, bins.astype(np.int64), starts
+    widest = np.maximum.reduceat(reaches[order], starts[:-1]) if len(order) else reaches
+    table = np.ascontiguousarray(models[order]), order, parents[order], extents[order], bins >> 12, starts, widest
     # one bin after the other, or pieces of it: the pieces do not depend on the number of threads
     pieces = [
         (int(b), int(first), int(min(first + PIECE, starts[b + 1])))
@@ -136,27 +137,28 @@ def _pairs(
     extents: FloatArray,
     bins: IndexArray,
     starts: IndexArray,
+    widest: FloatArray,
     own: int,
     first: int,
     last: int,
     least_ratio: float,
     widths: tuple[float, float, float],
 ) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """Give the pairs of the candidates first..last of one bin with those after them in it and with the next bin."""
+    """Give the pairs of the candidates first..last of one bin with those after them in it and in later bins."""
     n, room = 0, 1024
     rows, columns, values = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
-    for b in range(own, min(own + 2, len(bins))):
+    for b in range(own, len(bins)):
         if bins[b] > bins[own] + 1:
-            continue
-        longest, largest = 0.0, 0.0
-        for j in range(starts[b], starts[b + 1]):
-            longest, largest = max(longest, extents[j]), max(largest, models[j, 6])
+            break
+        # the mean radius of a pair may exceed the smaller one by this much
+        span = max(widest[own], widest[b]) / least_ratio
         for i in range(first, last):
-            span = max(REACH * 0.5 * (models[i, 6] + largest), max(extents[i], longest))
             begin = i + 1 if b == own else _first_from(models, starts[b], starts[b + 1], models[i, 0] - span)
             for j in range(begin, starts[b + 1]):
                 if models[j, 0] > models[i, 0] + span:
                     break
+                if abs(models[j, 1] - models[i, 1]) > span or abs(models[j, 2] - models[i, 2]) > span:
+                    continue
                 reach = max(REACH * 0.5 * (models[i, 6] + models[j, 6]), max(extents[i], extents[j]))
                 value = _play(models[i], models[j], reach, least_ratio, widths)
                 if value == 0.0 or parents[i] == parents[j]:
