@@ -7,7 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cylx.config import Config, load_config, named_options
+from cylx.config import Config, check_tolerance, load_config
+from cylx.config_layers import named_options
 from cylx.io import read_cloud
 from cylx.pipeline import extract_cylinders
 from cylx.records import Extraction, Observer, PointCloud, SilentObserver
@@ -26,6 +27,9 @@ def extract(
     radius: tuple[float | None, float | None] | None = None,
     max_cylinders: int | None = None,
     planes: int | None = None,
+    axis: Sequence[float] | str | None = None,
+    axis_tolerance_deg: float | None = None,
+    min_coverage_deg: float | None = None,
     threads: int | None = None,
     observer: Observer | None = None,
 ) -> Extraction:
@@ -49,6 +53,12 @@ def extract(
         Most cylinders extracted.
     planes : int, optional
         Number of planes through the whole cloud.
+    axis : sequence of float or str, optional
+        Direction of the cylinders looked for: three numbers, or `x`, `y` or `z`; length and sign do not matter.
+    axis_tolerance_deg : float, optional
+        Largest angle of a cylinder to `axis`, degrees; 10 by default.
+    min_coverage_deg : float, optional
+        Smallest angle about its axis that must be seen of a cylinder, degrees.
     threads : int, optional
         Number of threads; the result does not depend on it. By default one a core.
     observer : Observer, optional
@@ -75,13 +85,23 @@ def extract(
     >>> [round(fit.cylinder.radius, 1) for fit in found.cylinders]
     [1.0]
     """
+    options = named_options(
+        seed=seed,
+        radius=radius,
+        max_cylinders=max_cylinders,
+        planes=planes,
+        axis=axis,
+        axis_tolerance_deg=axis_tolerance_deg,
+        min_coverage_deg=min_coverage_deg,
+    )
     settings = load_config(
         path=None if config is None or isinstance(config, Config) else Path(config),
         start=config if isinstance(config, Config) else None,
         preset=preset,
         overrides=overrides,
-        options=named_options(seed=seed, radius=radius, max_cylinders=max_cylinders, planes=planes),
+        options=options,
     )
+    check_tolerance(settings, options)
     if isinstance(points_or_path, PointCloud):
         cloud = points_or_path
     elif isinstance(points_or_path, str | PathLike):

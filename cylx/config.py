@@ -19,6 +19,7 @@ from cylx.errors import ConfigError
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]
+Axis = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
 class Section(BaseModel):
@@ -38,6 +39,16 @@ class SceneConfig(Section):
     """Smallest radius looked for, scene units. Raising it drops thin pipes."""
     radius_max: Positive | None = None
     """Largest radius looked for, scene units. Lowering it drops tanks and walls that are hardly curved."""
+    axis: Axis | None = None
+    """Direction of the cylinders looked for, in the coordinates of the scan; its length and sign do not matter."""
+    axis_tolerance_deg: Annotated[Number, Field(gt=0, le=90)] = 10.0
+    """Largest angle of a cylinder to `axis`, degrees; means nothing without it."""
+
+    @model_validator(mode="after")
+    def _check_axis(self) -> SceneConfig:
+        if self.axis is not None and not any(self.axis):
+            raise ValueError("axis [0, 0, 0] is no direction; write [0, 0, 1] for upright")
+        return self
 
     @model_validator(mode="after")
     def _check_radii(self) -> SceneConfig:
@@ -147,7 +158,7 @@ class VerificationConfig(Section):
     min_inliers: Annotated[int, Field(ge=0)] = 40
     """Fewest points of a cylinder."""
     min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 20.0
-    """Smallest angle about the axis that must be covered, degrees."""
+    """Smallest angle about the axis that must be covered, degrees. This one holds even if `enabled` is false."""
     min_height: Annotated[Number, Field(ge=0)] = 0.4
     """Smallest visible length, in radii."""
     max_slope: Annotated[Number, Field(ge=0)] = 0.03
@@ -234,36 +245,17 @@ def load_config(
     return _validate(merged, given)
 
 
-def named_options(
-    *,
-    seed: int | None = None,
-    radius: tuple[float | None, float | None] | None = None,
-    max_cylinders: int | None = None,
-    planes: int | None = None,
-) -> dict[str, object]:
-    """Give the dotted keys that the named options of the command line and of `cylx.extract` stand for.
+def check_tolerance(config: Config, options: Mapping[str, object]) -> None:
+    """Refuse a tolerance that was asked for by name, by `named_options`, where there is no axis.
 
-    Parameters
-    ----------
-    seed, max_cylinders, planes : int, optional
-        As in the configuration.
-    radius : pair of float or None, optional
-        Smallest and largest radius, scene units; None leaves a side to the configuration.
-
-    Returns
-    -------
-    dict
-        The options that were given, for `load_config`.
+    Raises
+    ------
+    ConfigError
+        If so.
     """
-    smallest, largest = radius or (None, None)
-    values = {
-        "seed": seed,
-        "max_cylinders": max_cylinders,
-        "slicing.planes": planes,
-        "scene.radius_min": smallest,
-        "scene.radius_max": largest,
-    }
-    return {key: value for key, value in values.items() if value is not None}
+    if config.scene.axis is None and "scene.axis_tolerance_deg" in options:
+        fault = "is given without the axis that it is to hold for"
+        raise ConfigError("axis tolerance", fault, "give --axis X,Y,Z, or scene.axis, too")
 
 
 def preset_names() -> tuple[str, ...]:

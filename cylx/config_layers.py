@@ -1,7 +1,8 @@
-"""The layers a configuration is put together from: presets, files and overrides, as plain nested values."""
+"""The layers a configuration is put together from: presets, files, overrides and options, as plain nested values."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,6 +11,7 @@ from cylx.errors import ConfigError
 from cylx.strict_yaml import parse_yaml
 
 _MOST_BYTES = 100_000
+_AXES = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
 
 
 class Layer(NamedTuple):
@@ -66,6 +68,57 @@ def override_layer(text: str) -> Layer:
     if not equals or not key.strip():
         raise ConfigError(f"--set {text}", "has no key and value", "write --set section.key=value")
     return Layer("--set ", nested(key.strip(), parse_yaml(value, f"--set {key.strip()}")))
+
+
+def named_options(
+    *,
+    seed: int | None = None,
+    radius: tuple[float | None, float | None] | None = None,
+    max_cylinders: int | None = None,
+    planes: int | None = None,
+    axis: Sequence[float] | str | None = None,
+    axis_tolerance_deg: float | None = None,
+    min_coverage_deg: float | None = None,
+) -> dict[str, object]:
+    """Give the dotted keys that the named options of the command line and of `cylx.extract` stand for.
+
+    Parameters
+    ----------
+    seed, max_cylinders, planes : int, optional
+        As in the configuration.
+    radius : pair of float or None, optional
+        Smallest and largest radius, scene units; None leaves a side to the configuration.
+    axis : sequence of float or str, optional
+        Direction of the cylinders, three numbers, or `x`, `y` or `z`.
+    axis_tolerance_deg : float, optional
+        Largest angle of a cylinder to the axis, degrees.
+    min_coverage_deg : float, optional
+        Smallest angle about the axis that must be covered, degrees.
+
+    Returns
+    -------
+    dict
+        The options that were given, for `load_config`.
+    """
+    smallest, largest = radius or (None, None)
+    values = {
+        "seed": seed,
+        "max_cylinders": max_cylinders,
+        "slicing.planes": planes,
+        "scene.radius_min": smallest,
+        "scene.radius_max": largest,
+        "scene.axis": None if axis is None else _axis(axis),
+        "scene.axis_tolerance_deg": axis_tolerance_deg,
+        "verification.min_coverage_deg": min_coverage_deg,
+    }
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _axis(axis: Sequence[float] | str) -> object:
+    """Give a direction as the file would have it; what is none is left for the validation to name."""
+    if isinstance(axis, str):
+        return _AXES.get(axis, axis)
+    return [x.item() if hasattr(x, "item") else x for x in axis]  # numpy's numbers are not those of YAML
 
 
 def nested(key: str, value: object) -> dict[str, Any]:

@@ -57,6 +57,19 @@ class Input(Part):
     bounds: Bounds
     """Bounding box of the finite points."""
 
+    @classmethod
+    def of(cls, extraction: Extraction) -> Input:
+        """Write down what was looked at."""
+        cloud = extraction.cloud
+        name = cloud.source.file if cloud.source.format == "array" else Path(cloud.source.file).name
+        return cls(
+            file=name.encode("utf-8", "backslashreplace").decode("utf-8"),
+            format=cloud.source.format,
+            points=cloud.rows,
+            sha256=cloud.source.sha256,
+            bounds=Bounds(min=_numbers(cloud.points.min(axis=0)), max=_numbers(cloud.points.max(axis=0))),
+        )
+
 
 class SceneScale(Part):
     """The scale of the cloud."""
@@ -93,11 +106,16 @@ class Uncertainty(Part):
     """Of two offsets of the axis, its two tilts and the radius; scene units and radians."""
 
 
-class ResultCylinder(Part):
-    """A cylinder and the evidence for it."""
+class Numbered(Part):
+    """What has a number."""
 
     id: Count
     """Position in the list; `cylinder_id` of its points in the annotated PLY."""
+
+
+class Measured(Part):
+    """The shape of a cylinder and what was measured of it."""
+
     axis_point: Vector
     """Middle of the visible extent, on the axis, scene units."""
     axis_direction: Vector
@@ -111,7 +129,7 @@ class ResultCylinder(Part):
     end: Vector
     """Upper end of the visible extent, on the axis, scene units."""
     inliers: Count
-    """Points that carry its `id`."""
+    """Points of its surface; in a result, those that carry its `id`."""
     rmse: Length
     """Root mean square distance of the inliers to the surface, scene units."""
     coverage_deg: Annotated[Number, Field(ge=0, le=360)]
@@ -127,27 +145,35 @@ class ResultCylinder(Part):
     evidence: dict[str, Number] | None = None
     """What the verification measured, by the name of the test; absent where nothing was measured."""
 
+    @staticmethod
+    def keys_of(fit: CylinderFit) -> dict[str, Any]:
+        """Write down a fit."""
+        shape = fit.cylinder
+        evidence = {name: float(value) for name, value in fit.evidence.items() if isfinite(value)}
+        return {
+            "axis_point": _numbers(shape.point),
+            "axis_direction": _numbers(shape.direction),
+            "radius": shape.radius,
+            "height": shape.height,
+            "start": _numbers(shape.start),
+            "end": _numbers(shape.end),
+            "inliers": int(fit.inliers),
+            "rmse": float(fit.rmse),
+            "coverage_deg": min(degrees(fit.coverage), 360.0),
+            "support": int(fit.support),
+            "payoff": float(fit.payoff),
+            "confidence": fit.confidence,
+            "evidence": evidence or None,
+        }
+
+
+class ResultCylinder(Measured, Numbered):  # the keys of the last one come first
+    """A cylinder and the evidence for it."""
+
     @classmethod
     def of(cls, index: int, fit: CylinderFit) -> ResultCylinder:
         """Write down cylinder number `index` of an extraction."""
-        shape = fit.cylinder
-        evidence = {name: float(value) for name, value in fit.evidence.items() if isfinite(value)}
-        return cls(
-            id=index,
-            axis_point=_numbers(shape.point),
-            axis_direction=_numbers(shape.direction),
-            radius=shape.radius,
-            height=shape.height,
-            start=_numbers(shape.start),
-            end=_numbers(shape.end),
-            inliers=int(fit.inliers),
-            rmse=float(fit.rmse),
-            coverage_deg=min(degrees(fit.coverage), 360.0),
-            support=int(fit.support),
-            payoff=float(fit.payoff),
-            confidence=fit.confidence,
-            evidence=evidence or None,
-        )
+        return cls(id=index, **cls.keys_of(fit))
 
 
 class Result(Part):
@@ -185,7 +211,7 @@ class Result(Part):
         """
         return cls(
             cylx_version=__version__,
-            input=_input(extraction),
+            input=Input.of(extraction),
             config=extraction.config.model_dump(mode="json"),
             scene=SceneScale(spacing=float(extraction.scene.spacing), noise=float(extraction.scene.noise)),
             stages=[_stage(report) for report in extraction.stages],
@@ -218,32 +244,29 @@ class Result(Part):
     def to_object(self) -> dict[str, Any]:
         """Give the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        for part in [content["input"], *content["cylinders"]]:
-            for key in [key for key, value in part.items() if value is None]:
-                del part[key]
+        drop_missing([content["input"], *content["cylinders"]])
         return content
 
     def to_json(self) -> str:
         """Give the text of the file, with a newline at its end."""
-        return json.dumps(self.to_object(), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+        return text_of(self.to_object())
+
+
+def drop_missing(parts: Iterable[dict[str, Any]]) -> None:
+    """Take what was not computed out of parts of a JSON object."""
+    for part in parts:
+        for key in [key for key, value in part.items() if value is None]:
+            del part[key]
+
+
+def text_of(content: Mapping[str, Any]) -> str:
+    """Give the text of a JSON file, with a newline at its end."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def result_schema() -> dict[str, Any]:
     """Give the JSON schema of the result file."""
     return Result.model_json_schema(by_alias=True)
-
-
-def _input(extraction: Extraction) -> Input:
-    """Write down what was looked at."""
-    cloud = extraction.cloud
-    name = cloud.source.file if cloud.source.format == "array" else Path(cloud.source.file).name
-    return Input(
-        file=name.encode("utf-8", "backslashreplace").decode("utf-8"),
-        format=cloud.source.format,
-        points=cloud.rows,
-        sha256=cloud.source.sha256,
-        bounds=Bounds(min=_numbers(cloud.points.min(axis=0)), max=_numbers(cloud.points.max(axis=0))),
-    )
 
 
 def _stage(report: StageReport) -> Stage:

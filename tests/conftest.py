@@ -61,15 +61,16 @@ def make_extraction():
     """Make an extraction of a cloud by hand: cylinders of radius 1, 2, … on the z axis, all points on the first."""
     from cylx.config import Config
     from cylx.geometry.cylinder import Cylinder
-    from cylx.records import CylinderFit, Extraction, PointCloud, Scene, StageReport
+    from cylx.records import CylinderFit, Extraction, PointCloud, Rejection, Scene, StageReport
 
-    def make(cloud=None, config=None, *, cylinders=2):
+    def make(cloud=None, config=None, *, cylinders=2, rejected=1):
         cloud = PointCloud(POINTS) if cloud is None else cloud
         shapes = [Cylinder((0, 0, 2), (0, 0, 1), i + 1.0, 4.0) for i in range(cylinders)]
         fits = [
             CylinderFit(shape, max(24 - i, 1), 0.25, 2 * np.pi, 3, 0.5, evidence={"slope": 0.125})
             for i, shape in enumerate(shapes)
         ]
+        refused = CylinderFit(Cylinder((1, 0, 0), (0, 1, 0), 0.5, 1.0), 7, 0.125, np.pi, 3, 0.5)
         return Extraction(
             cylinders=tuple(fits),
             labels=np.full(len(cloud.points), 0 if fits else -1, np.int32),
@@ -79,6 +80,7 @@ def make_extraction():
             stages=(StageReport("slicing", 40, 38, {"too few points": 2}),),
             config=config or Config(),
             warnings=("made by hand",),
+            rejected=(Rejection(refused, "agreement"),) * rejected,
         )
 
     return make

@@ -55,11 +55,20 @@ def test_rows_that_are_not_finite_stay_rows(asked):
 def test_options_are_those_of_the_command(asked, tmp_path):
     (tmp_path / "my.yaml").write_text("preset: paper\nslicing: {min_points: 9}")
     options = {"seed": 3, "radius": (None, 2.0), "max_cylinders": 4, "planes": 7, "overrides": ["slicing.thickness=1"]}
+    options |= {"axis": "y", "axis_tolerance_deg": 5.0, "min_coverage_deg": 60}
     cylx.extract([[0, 0, 0]], config=tmp_path / "my.yaml", threads=2, **options)
     expected = load_config(
         preset="paper",
         overrides=["slicing.thickness=1", "slicing.min_points=9"],
-        options={"seed": 3, "scene.radius_max": 2.0, "max_cylinders": 4, "slicing.planes": 7},
+        options={
+            "seed": 3,
+            "scene.radius_max": 2.0,
+            "max_cylinders": 4,
+            "slicing.planes": 7,
+            "scene.axis": [0, 1, 0],
+            "scene.axis_tolerance_deg": 5,
+            "verification.min_coverage_deg": 60,
+        },
     )
     assert asked[0][1] == expected
     assert asked[0][2]["threads"] == 2
@@ -76,6 +85,10 @@ def test_a_configuration_can_be_handed_over_and_changed(asked):
 def test_faults_are_errors_of_cylx(tmp_path):
     with pytest.raises(ConfigError, match="scene: radius_min 3 is above radius_max 1; swap them"):
         cylx.extract([[0, 0, 0]], radius=(3, 1))
+    with pytest.raises(ConfigError, match="axis tolerance: is given without the axis"):
+        cylx.extract([[0, 0, 0]], axis_tolerance_deg=5)
+    with pytest.raises(ConfigError, match=r"scene\.axis: 'up' is not a list"):
+        cylx.extract([[0, 0, 0]], axis="up")
     with pytest.raises(InputError, match="no such file"):
         cylx.extract(tmp_path / "none.ply")
     with pytest.raises(ValueError, match=r"points must have shape \(N, 3\), not \(2,\)"):

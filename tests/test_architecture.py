@@ -10,7 +10,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
     "api", "cli", "config", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "noise", "payoff",
-    "pipeline", "records", "results",
+    "pipeline", "records", "rejections", "results",
     "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
@@ -24,6 +24,7 @@ MAY_IMPORT = {
     "payoff": {"game", "geometry"},
     "scene": {"config", "errors", "geometry", "noise", "records"},
     "results": {"config", "cylx", "errors", "geometry", "records"},
+    "rejections": {"cylx", "records", "results"},
     "io": {"errors", "geometry", "records"},
     "records": {"config", "geometry"},
     "config": {"errors"},

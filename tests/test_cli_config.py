@@ -90,6 +90,18 @@ def test_schema_is_the_one_of_the_result(run_cylx, make_extraction):
         jsonschema.validate({**content, "schema": "other/1"}, schema)
 
 
+def test_schema_is_the_one_of_what_was_rejected(run_cylx, make_extraction):
+    from cylx.rejections import Rejections
+
+    schema = json.loads(run_cylx("config", "schema", "--rejected").stdout)
+    content = Rejections.of(make_extraction()).to_object()
+    jsonschema.validate(content, schema)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({**content, "schema": "other/1"}, schema)
+    both = run_cylx("config", "schema", "--rejected", "--result")
+    assert (both.exit_code, both.stderr) == (2, "cylx: --rejected: contradicts --result; leave one of them out\n")
+
+
 @pytest.mark.parametrize("command", ["show", "check", "init", "schema"])
 def test_a_wrong_option_is_one_line(run_cylx, command):
     failed = run_cylx("config", command, "--nonsense")

@@ -8,9 +8,11 @@ import jsonschema
 import pytest
 from plyfile import PlyData
 
+import cylx.io
 from cylx.cli.display import Conversation
 from cylx.cli.outputs import plan_jobs
 from cylx.errors import InputError, OutputError, UsageError
+from cylx.rejections import rejections_schema
 from cylx.results import result_schema
 
 pytestmark = pytest.mark.usefixtures("fake_pipeline")
@@ -166,10 +168,11 @@ def test_outputs_in_the_way_of_each_other_are_refused(tmp_path, monkeypatch, sca
     assert str(caught.value).removeprefix("./") == message.removeprefix("./")
 
 
-@pytest.mark.parametrize("existing", ["scan.cylinders.json", "scan.annotated.ply", "times.json"])
+@pytest.mark.parametrize("existing", ["scan.cylinders.json", "scan.annotated.ply", "times.json", "no.json"])
 def test_what_exists_is_refused_before_computing(run_cylx, scan, fake_pipeline, existing):
     scan.with_name(existing).write_text("precious")
-    failed = run_cylx("extract", scan, "--profile", scan.with_name("times.json"))
+    others = ["--profile", scan.with_name("times.json"), "--rejected", scan.with_name("no.json")]
+    failed = run_cylx("extract", scan, *others)
     place = scan.with_name(existing)
     line = f"cylx: {place}: exists already; choose another name, or give --overwrite\n"
     assert (failed.exit_code, failed.stderr) == (4, line)
@@ -191,13 +194,20 @@ def test_overwrite_replaces_it(run_cylx, scan):
     assert json.loads(scan.with_name("scan.cylinders.json").read_bytes())["schema"] == "cylx.cylinders/1"
 
 
-@pytest.mark.parametrize("broken", ["write_text", "write_annotated"])
-def test_both_files_are_written_or_neither(run_cylx, scan, monkeypatch, broken):
-    def refuse(path, *_, **__):
-        raise OutputError(str(path), "cannot be written: no space left on device", "free some space")
+@pytest.mark.parametrize("broken", [("write_text", 1), ("write_text", 2), ("write_annotated", 1)])
+def test_all_files_are_written_or_none(run_cylx, scan, monkeypatch, broken):
+    name, last = broken
+    write, calls = getattr(cylx.io, name), []
 
-    monkeypatch.setattr(f"cylx.io.{broken}", refuse)
-    assert run_cylx("extract", scan).exit_code == 4
+    def refuse(path, *args, **settings):
+        calls.append(path)
+        if len(calls) == last:
+            raise OutputError(str(path), "cannot be written: no space left on device", "free some space")
+        write(path, *args, **settings)
+
+    monkeypatch.setattr(f"cylx.io.{name}", refuse)
+    assert run_cylx("extract", scan, "--rejected", scan.with_name("no.json")).exit_code == 4
+    assert len(calls) == last
     assert names(scan.parent) == ["scan.xyz"]
 
 
@@ -231,7 +241,55 @@ def test_profile_has_the_times_of_the_stages(run_cylx, scan, tmp_path):
     assert "seconds" not in scan.with_name("scan.cylinders.json").read_text()
 
 
+# what was not accepted
+
+
+def test_rejected_has_what_was_not_accepted(run_cylx, scan, tmp_path):
+    done = run_cylx("extract", scan, "--rejected", tmp_path / "no.json")
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert names(tmp_path) == ["no.json", "scan.annotated.ply", "scan.cylinders.json", "scan.xyz"]
+    first = done.stderr.splitlines()[0]
+    written = [tmp_path / name for name in ("scan.cylinders.json", "scan.annotated.ply", "no.json")]
+    assert first == f"{scan}: 2 cylinders, written to {written[0]}, {written[1]} and {written[2]}"
+    content = json.loads((tmp_path / "no.json").read_bytes())
+    jsonschema.validate(content, rejections_schema())
+    assert [rejected["reason"] for rejected in content["rejected"]] == ["agreement"]
+    assert "rejected" not in json.loads(scan.with_name("scan.cylinders.json").read_bytes())
+    assert run_cylx("extract", scan, "--rejected", tmp_path / "no.json", "--overwrite", "-q").exit_code == 0
+    assert json.loads((tmp_path / "no.json").read_bytes()) == content
+
+
+def test_rejected_may_go_to_standard_output(run_cylx, scan):
+    done = run_cylx("extract", scan, "--rejected", "-")
+    assert json.loads(done.stdout)["schema"] == "cylx.rejected/1"
+    assert names(scan.parent) == ["scan.annotated.ply", "scan.cylinders.json", "scan.xyz"]
+
+
+def test_rejected_of_several_scans_goes_into_a_folder(run_cylx, scans, tmp_path, fake_pipeline):
+    for name in ("all.json", "-", str(tmp_path / "a.xyz")):
+        failed = run_cylx("extract", *scans, "--rejected", name)
+        line = f"cylx: --rejected {name}: is one file for several inputs; give a folder, or one input\n"
+        assert (failed.exit_code, failed.stderr) == (2, line)
+    gone = f"{tmp_path}/gone/"
+    failed = run_cylx("extract", *scans, "--rejected", gone)
+    assert (failed.exit_code, failed.stderr) == (4, f"cylx: {gone}: no such folder; create it first\n")
+    assert fake_pipeline.calls == []
+    (tmp_path / "no").mkdir()
+    assert run_cylx("extract", *scans, "--rejected", tmp_path / "no", "--no-annotate").exit_code == 0
+    assert names(tmp_path / "no") == ["a.rejected.json", "b.rejected.json", "c.rejected.json"]
+
+
 # options
+
+
+def test_what_is_known_reaches_the_pipeline(run_cylx, scan, fake_pipeline):
+    options = ["--axis", "0,-2,1", "--axis-tolerance", 5, "--min-coverage", 60, "-o", "-"]
+    assert run_cylx("extract", scan, *options).exit_code == 0
+    assert run_cylx("extract", scan, "--axis", "y", "-o", "-").exit_code == 0
+    (_, config, _), (_, other, _) = fake_pipeline.calls
+    assert (config.scene.axis, config.scene.axis_tolerance_deg) == ([0, -2, 1], 5)
+    assert config.verification.min_coverage_deg == 60
+    assert (other.scene.axis, other.scene.axis_tolerance_deg) == ([0, 1, 0], 10)
 
 
 def test_options_reach_the_pipeline(run_cylx, scan, tmp_path, fake_pipeline):

@@ -6,8 +6,9 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cylx.config import Config, Section, load_config, named_options, preset_names
+from cylx.config import Config, Section, check_tolerance, load_config, preset_names
 from cylx.config_faults import dotted_keys
+from cylx.config_layers import named_options
 from cylx.config_text import commented_yaml, plain_yaml
 from cylx.errors import ConfigError
 from cylx.strict_yaml import parse_yaml
@@ -96,6 +97,20 @@ def test_named_options_leave_out_what_was_not_given():
         "slicing.planes": 0,
         "scene.radius_min": 1.0,
     }
+    assert named_options(axis=(0, -1, 0), axis_tolerance_deg=5, min_coverage_deg=0) == {
+        "scene.axis": [0, -1, 0],
+        "scene.axis_tolerance_deg": 5,
+        "verification.min_coverage_deg": 0,
+    }
+    assert [named_options(axis=name)["scene.axis"] for name in "xyz"] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+
+
+def test_a_tolerance_may_be_given_apart_from_its_axis_but_not_without():
+    options = named_options(axis_tolerance_deg=5)
+    check_tolerance(load_config(overrides=["scene.axis=[0, 0, 1]"], options=options), options)
+    check_tolerance(load_config(overrides=["scene.axis_tolerance_deg=5"]), {})
+    with pytest.raises(ConfigError, match="axis tolerance: is given without the axis that it is to hold for"):
+        check_tolerance(load_config(options=options), options)
 
 
 # what a file may look like
@@ -181,6 +196,21 @@ REFUSED = [
         "slicing: {planes: 0}\ncandidates: {sources: [slices]}",
         "my.yaml: there are no planes, and candidates.sources has slices alone; raise slicing.planes",
     ),
+    ("scene: {axis: [0, 0, 0]}", "my.yaml: scene: axis [0, 0, 0] is no direction; write [0, 0, 1] for upright"),
+    (
+        "scene: {axis: [0, 1, 2, 3]}",
+        "my.yaml: scene.axis: [0, 1, 2, 3] is too long; it must have 3 or fewer entries",
+    ),
+    (
+        "scene: {axis: [0, 1, up]}",
+        "my.yaml: scene.axis.2: 'up' is not a number; write a number such as 0.05",
+    ),
+    (
+        "scene: {axis: [0, 1, .inf]}",
+        "my.yaml: scene.axis.2: '.inf' is not a number; write a number such as 0.05",
+    ),
+    ("scene: {axis_tolerance_deg: 0}", "my.yaml: scene.axis_tolerance_deg: 0 is out of range; it must be > 0"),
+    ("scene: {axis_tolerance_deg: 91}", "my.yaml: scene.axis_tolerance_deg: 91 is out of range; it must be <= 90"),
     ("- a\n- b", "my.yaml: has no keys at its top level; write 'section:' and its keys below it"),
     ("seed", "my.yaml: has no keys at its top level; write 'section:' and its keys below it"),
     ("seed: 1\n\nseed: 2", "my.yaml:3: the key 'seed' appears twice; leave one of them out"),

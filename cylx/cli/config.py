@@ -10,6 +10,7 @@ import click
 from cylx.cli.failures import answer
 from cylx.cli.group import ExampleGroup
 from cylx.cli.options import PRESETS, complete_files, configured, debug_option, json_option, overwrite_option
+from cylx.errors import UsageError
 
 if TYPE_CHECKING:
     from cylx.config import Config
@@ -64,13 +65,20 @@ def check(*, file: str) -> None:
 
 @config.command(examples=["cylx config schema > cylx.schema.json", "cylx config schema --result"])
 @click.option("--result", is_flag=True, help="The schema of NAME.cylinders.json instead.")
+@click.option("--rejected", is_flag=True, help="The schema of what 'cylx extract --rejected' writes instead.")
 @debug_option
-def schema(*, result: bool) -> None:
-    """Print the JSON schema of the configuration, or of the result.
+def schema(*, result: bool, rejected: bool) -> None:
+    """Print the JSON schema of the configuration, or of the files that are written.
 
     Editors that know the schema complete and check the YAML while it is written.
     """
-    if result:
+    if result and rejected:
+        raise UsageError("--rejected", "contradicts --result", "leave one of them out")
+    if rejected:
+        from cylx.rejections import rejections_schema
+
+        document = rejections_schema()
+    elif result:
         from cylx.results import result_schema
 
         document = result_schema()

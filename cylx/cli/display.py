@@ -63,7 +63,8 @@ class Conversation:
         written = [name for name in job.outputs if name != "-"]
         scan = "standard input" if job.scan == "-" else job.scan
         count = f"{len(fits)} cylinder{'' if len(fits) == 1 else 's'}"
-        tell(f"{scan}: {count}" + (f", written to {' and '.join(written)}" if written else ""))
+        names = " and ".join(filter(None, [", ".join(written[:-1]), *written[-1:]]))
+        tell(f"{scan}: {count}" + (f", written to {names}" if written else ""))
         for warning in extraction.warnings:
             tell(f"warning: {warning}")
         if self.verbose:

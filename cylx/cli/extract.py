@@ -42,6 +42,12 @@ if TYPE_CHECKING:
     shell_complete=complete_files,
     help="Name of the annotated PLY.  [default: beside the JSON]",
 )
+@click.option(
+    "--rejected",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Write what was not accepted, and why, as JSON; - for standard output, or a folder.",
+)
 @configured
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
 @click.option(
@@ -62,6 +68,7 @@ def extract(
     output: str | None,
     annotate: bool | None,
     annotated: str | None,
+    rejected: str | None,
     settings: Config,
     threads: int | None,
     require: int | None,
@@ -75,7 +82,7 @@ def extract(
     cylinders, and scan.annotated.ply, the cloud with the cylinder of each point. Nothing has to be tuned: spacing,
     noise and radii are read off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
     """
-    jobs = plan_jobs(scans, output, annotate, annotated)
+    jobs = plan_jobs(scans, output, annotate, annotated, rejected)
     extras = [] if profile is None else [profile]
     check_apart(scans, [*(name for job in jobs for name in job.outputs), *extras])
     check_outputs(jobs, extras, overwrite=overwrite)

@@ -2,7 +2,7 @@
 
 | function | options | the command gets |
 |---|---|---|
-| `configured` | `-c/--config --preset --set --seed --radius --max-cylinders --planes` | `settings`, a `Config` |
+| `configured` | `-c/--config --preset --set --seed` and what is known: `--radius --axis` … | `settings`, a `Config` |
 | `talking` | `-q/--quiet -v/--verbose` | `talk`, a `Conversation` |
 | `overwrite_option` | `--overwrite` | `overwrite`, a bool |
 | `json_option` | `--json` | `as_json`, a bool |
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
+from math import isfinite
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -31,8 +32,9 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     BoundsType = click.ParamType[Bounds]
+    VectorType = click.ParamType[tuple[float, ...]]
 else:
-    BoundsType = click.ParamType  # not generic in older versions
+    BoundsType = VectorType = click.ParamType  # not generic in older versions
 
 
 class RadiusRange(BoundsType):
@@ -65,6 +67,40 @@ class RadiusRange(BoundsType):
         return radius
 
 
+class Vector(VectorType):
+    """`X,Y,Z`."""
+
+    name = "x,y,z"
+    example = "100,200,0"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Read the three numbers."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            numbers = ()
+        if len(numbers) != 3:
+            self.fail(f"'{value}' is not three numbers such as {self.example}", param, ctx)
+        return numbers
+
+
+class Axis(Vector):
+    """`X,Y,Z` as a direction, or the name of a coordinate axis."""
+
+    example = "0,0,1, and not x, y or z"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
+        """Read the three numbers, or the name."""
+        if value in ("x", "y", "z"):
+            return tuple(float(name == value) for name in "xyz")
+        axis = super().convert(value, param, ctx)
+        if not (any(axis) and all(map(isfinite, axis))):
+            self.fail(f"'{value}' is no direction; the numbers must be finite, and one of them not 0", param, ctx)
+        return axis
+
+
 def complete_files(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
     """Tell the shell to complete a file name."""
     from click.shell_completion import CompletionItem
@@ -85,12 +121,25 @@ def configured(command: Command) -> Command:
         radius: Bounds | None,
         max_cylinders: int | None,
         planes: int | None,
+        axis: tuple[float, ...] | None,
+        axis_tolerance_deg: float | None,
+        min_coverage_deg: float | None,
         **others: object,
     ) -> object:
-        from cylx.config import load_config, named_options
+        from cylx.config import check_tolerance, load_config
+        from cylx.config_layers import named_options
 
-        options = named_options(seed=seed, radius=radius, max_cylinders=max_cylinders, planes=planes)
+        options = named_options(
+            seed=seed,
+            radius=radius,
+            max_cylinders=max_cylinders,
+            planes=planes,
+            axis=axis,
+            axis_tolerance_deg=axis_tolerance_deg,
+            min_coverage_deg=min_coverage_deg,
+        )
         settings = load_config(path=config, preset=preset, overrides=overrides, options=options)
+        check_tolerance(settings, options)
         return command(*args, settings=settings, **others)
 
     for option in reversed(_CONFIGURATION):
@@ -117,6 +166,23 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
     ),
     click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of everything random.  [default: 0]"),
     click.option("--radius", type=RadiusRange(), help="Smallest and largest radius, in the unit of the scan."),
+    click.option(
+        "--axis", type=Axis(), help="Direction of the cylinders, either way, or just x, y or z.  [default: any]"
+    ),
+    click.option(
+        "--axis-tolerance",
+        "axis_tolerance_deg",
+        type=click.FloatRange(0, 90, min_open=True),
+        metavar="DEG",
+        help="Largest angle of a cylinder to --axis, degrees.  [default: 10]",
+    ),
+    click.option(
+        "--min-coverage",
+        "min_coverage_deg",
+        type=click.FloatRange(0, 360),
+        metavar="DEG",
+        help="Smallest angle about its axis that must be seen of a cylinder, degrees.  [default: 20]",
+    ),
     click.option("--max-cylinders", type=click.IntRange(min=1), metavar="N", help="Give at most so many cylinders."),
     click.option("--planes", type=click.IntRange(min=0), metavar="N", help="Number of planes through the whole cloud."),
 )

@@ -6,7 +6,7 @@ import contextlib
 import os
 import secrets
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from cylx.errors import OutputError, UsageError
 if TYPE_CHECKING:
     from cylx.records import Extraction
 
-RESULT, ANNOTATED, TRUTH = ".cylinders.json", ".annotated.ply", ".truth.json"
+RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated.ply", ".rejected.json", ".truth.json"
 STREAM = "-"
 
 
@@ -31,24 +31,34 @@ class Job:
         The JSON, `-` for standard output.
     annotated : str or None
         The annotated PLY, `-` for standard output, None for none.
+    rejected : str or None
+        The JSON of what was not accepted, `-` for standard output, None for none.
     """
 
     scan: str
     result: str
     annotated: str | None
+    rejected: str | None = None
 
     @property
     def outputs(self) -> list[str]:
         """What it writes."""
-        return [self.result] if self.annotated is None else [self.result, self.annotated]
+        return [name for name in (self.result, self.annotated, self.rejected) if name is not None]
 
 
-def plan_jobs(scans: Sequence[str], output: str | None, annotate: bool | None, annotated: str | None) -> list[Job]:
+def plan_jobs(
+    scans: Sequence[str],
+    output: str | None,
+    annotate: bool | None,
+    annotated: str | None,
+    rejected: str | None = None,
+) -> list[Job]:
     """Name the outputs of every scan.
 
     They lie beside the scan, or where `-o` says: a file for one scan, an existing folder for one or several. The
-    annotated PLY lies beside the JSON. What comes from standard input goes to standard output, unless `-o` says
-    otherwise, and what goes to standard output goes there alone, unless an annotated PLY is asked for.
+    annotated PLY lies beside the JSON; what was not accepted is written only where `--rejected` says. What comes from
+    standard input goes to standard output, unless `-o` says otherwise, and what goes to standard output goes there
+    alone, unless an annotated PLY is asked for.
 
     Parameters
     ----------
@@ -60,16 +70,21 @@ def plan_jobs(scans: Sequence[str], output: str | None, annotate: bool | None, a
         `--annotate` or `--no-annotate`, None for neither.
     annotated : str or None
         `--annotated`.
+    rejected : str or None
+        `--rejected`.
 
     Raises
     ------
     UsageError
         If two outputs, or an output and an input, are the same file, or an output has no name.
     """
-    output, annotated = (STREAM if name == "/dev/stdout" else name for name in (output, annotated))
+    names = (output, annotated, rejected)
+    output, annotated, rejected = (STREAM if name == "/dev/stdout" else name for name in names)
     if len(scans) > 1:
-        _check_batch(scans, output, annotated)
+        _check_batch(scans, output, annotated, rejected)
     jobs = [_plan(scan, output, annotate, annotated) for scan in scans]
+    if rejected is not None:
+        jobs = [replace(job, rejected=_inside(rejected, job.scan, REJECTED)) for job in jobs]
     check_apart(scans, [name for job in jobs for name in job.outputs])
     return jobs
 
@@ -116,7 +131,7 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
 
 
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
-    """Write the JSON and the annotated PLY of one scan, both or neither.
+    """Write the JSON, the annotated PLY and what was not accepted of one scan, all or nothing.
 
     Raises
     ------
@@ -124,27 +139,30 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
         If one of them cannot be written.
     """
     from cylx.io import write_annotated, write_text
+    from cylx.rejections import Rejections
     from cylx.results import Result
 
     text = Result.of(extraction).to_json()
     with contextlib.ExitStack() as stack:
-        staged = None
-        if job.annotated is not None and _is_new_or_file(job.annotated):
-            staged = stack.enter_context(_moved_at_the_end(job.annotated, overwrite=overwrite))
+
+        def staged(name: str) -> str | Path:
+            """Give the name to write an output to for now; a stream or a device has no other."""
+            return stack.enter_context(_moved_at_the_end(name, overwrite=overwrite)) if _is_new_or_file(name) else name
+
         if job.annotated is not None:
-            write_annotated(staged or job.annotated, extraction, overwrite=overwrite)
+            write_annotated(staged(job.annotated), extraction, overwrite=overwrite)
+        if job.rejected is not None:
+            write_text(staged(job.rejected), Rejections.of(extraction).to_json(), overwrite=overwrite)
         write_text(job.result, text, overwrite=overwrite)
 
 
 def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str | None) -> Job:
     """Name the outputs of one scan."""
-    stem = "stdin" if scan == STREAM else Path(scan).stem
+    stem = _stem(scan)
     if output is None:
         result = STREAM if scan == STREAM else str(Path(scan).parent / (stem + RESULT))
-    elif output != STREAM and (Path(output).is_dir() or output.endswith(("/", os.sep))):
-        result = str(Path(output) / (stem + RESULT))
     else:
-        result = output
+        result = _inside(output, scan, RESULT)
     if annotated is not None:
         if annotate is False:
             raise UsageError("--annotated", "contradicts --no-annotate", "leave one of them out")
@@ -159,7 +177,22 @@ def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str |
     return Job(scan, result, str(Path(scan).parent / (stem + ANNOTATED)))
 
 
-def _check_batch(scans: Sequence[str], output: str | None, annotated: str | None) -> None:
+def _stem(scan: str) -> str:
+    """Give the NAME in the names of the outputs of a scan."""
+    return "stdin" if scan == STREAM else Path(scan).stem
+
+
+def _inside(output: str, scan: str, ending: str) -> str:
+    """Name an output that may be a folder to put it into."""
+    return str(Path(output) / (_stem(scan) + ending)) if _is_folder(output) else output
+
+
+def _is_folder(output: str) -> bool:
+    """Tell whether an output is a folder, or is written as if it were one."""
+    return output != STREAM and (Path(output).is_dir() or output.endswith(("/", os.sep)))
+
+
+def _check_batch(scans: Sequence[str], output: str | None, annotated: str | None, rejected: str | None) -> None:
     """Refuse what works for one scan only."""
     if STREAM in scans:
         raise UsageError("-", "standard input is one of several inputs", "give it alone")
@@ -167,8 +200,11 @@ def _check_batch(scans: Sequence[str], output: str | None, annotated: str | None
         raise UsageError("--annotated", "names one file for several inputs", "leave it out, or give one input")
     if output is not None and (output == STREAM or Path(output).is_file()):
         raise UsageError(f"-o {output}", "is one file for several inputs", "give a folder, or one input")
-    if output is not None and not Path(output).is_dir():
-        raise OutputError(output, "no such folder", "create it first")
+    if rejected is not None and not _is_folder(rejected):
+        raise UsageError(f"--rejected {rejected}", "is one file for several inputs", "give a folder, or one input")
+    for name in (output, rejected):
+        if name is not None and not Path(name).is_dir():
+            raise OutputError(name, "no such folder", "create it first")
 
 
 def _is_there(scan: str) -> bool:
@@ -188,7 +224,7 @@ def _moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[Path]:
 
     check_writable(name, overwrite=overwrite)
     target = Path(os.path.realpath(name))
-    staged = target.with_name(f".cylx-{secrets.token_hex(8)}.ply")
+    staged = target.with_name(f".cylx-{secrets.token_hex(8)}{target.suffix}")
     try:
         yield staged
         staged.replace(target)

@@ -10,36 +10,14 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 import click
 
 from cylx.cli.group import ExampleGroup
-from cylx.cli.options import Bounds, RadiusRange, complete_files, debug_option, overwrite_option
+from cylx.cli.options import Bounds, RadiusRange, Vector, complete_files, debug_option, overwrite_option
 from cylx.cli.outputs import TRUTH, check_apart
 from cylx.errors import UsageError
 
 if TYPE_CHECKING:
     from cylx.synthetic import SyntheticScene
 
-    VectorType = click.ParamType[tuple[float, ...]]
-else:
-    VectorType = click.ParamType  # not generic in older versions
-
 Command = TypeVar("Command", bound=Callable[..., Any])
-
-
-class Vector(VectorType):
-    """`X,Y,Z`."""
-
-    name = "x,y,z"
-
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """Read the three numbers."""
-        if isinstance(value, tuple):
-            return value
-        try:
-            numbers = tuple(float(part) for part in str(value).split(","))
-        except ValueError:
-            numbers = ()
-        if len(numbers) != 3:
-            self.fail(f"'{value}' is not three numbers such as 100,200,0", param, ctx)
-        return numbers
 
 
 def output_options(command: Command) -> Command:

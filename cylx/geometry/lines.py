@@ -1,9 +1,9 @@
-"""Lines in space: their common perpendicular."""
+"""Lines in space: their common perpendicular, and whether they are parallel to an axis."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
@@ -63,3 +63,29 @@ def common_perpendicular(
         np.where(parallel, 0.0, angle)[..., 0],
         axis,
     )
+
+
+def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> NDArray[np.bool_]:
+    """Tell which directions are parallel to an axis within an angle; signs do not matter.
+
+    Parameters
+    ----------
+    directions : ndarray of shape (..., 3)
+    axis : array_like of shape (3,)
+        Of any length but zero.
+    tolerance : float
+        Greatest angle, radians; a right angle admits all.
+
+    Returns
+    -------
+    ndarray of shape (...), bool
+
+    Examples
+    --------
+    >>> are_along(np.array([[0.0, 0.1, -1.0], [0.0, 1.0, 1.0]]), (0, 0, 2), np.radians(10))
+    array([ True, False])
+    """
+    line = np.array(axis, dtype=np.float64)
+    line /= np.abs(line).max()  # so that its square neither overflows nor vanishes
+    sine = np.linalg.norm(np.cross(directions, line), axis=-1)
+    return np.asarray(np.arctan2(sine, np.abs(directions @ line)) <= tolerance, dtype=np.bool_)

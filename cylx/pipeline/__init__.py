@@ -8,7 +8,12 @@ from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.pipeline.conclusion import conclude
 from cylx.pipeline.journal import Journal
-from cylx.pipeline.sources import candidates_of_slices, ellipses_of_slices, windows_and_flatness
+from cylx.pipeline.sources import (
+    candidates_along_axis,
+    candidates_of_slices,
+    ellipses_of_slices,
+    windows_and_flatness,
+)
 from cylx.pipeline.turns import Turns
 from cylx.pipeline.warmup import kernels_are_cold, practice_cloud
 from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
@@ -60,7 +65,8 @@ def extract_cylinders(
     with journal.stage("candidates"):
         candidates = Candidates.joined([windows, candidates_of_slices(fits, frame, radii, config, journal)])
     with journal.stage("clustering"):
-        players = thin_candidates(candidates) if config.clustering.population == "local" else candidates
+        players = candidates_along_axis(candidates, config, journal)
+        players = thin_candidates(players) if config.clustering.population == "local" else players
         witnesses = windows if len(windows) else candidates
         turns = Turns(CandidateGame(players, config.clustering), players, witnesses, ground, radii, config)
     with journal.stage("averaging"):

@@ -1,4 +1,4 @@
-"""The two sources of candidates: slices, as in the paper, and local curvature."""
+"""The two sources of candidates: slices, as in the paper, and local curvature; and which of them may play."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import Config
+from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
 from cylx.records import Candidates, EllipseFit, Frame
 from cylx.stages.candidates import polish_candidates, propose_cylinders
@@ -21,6 +22,8 @@ LARGE = 6.0
 """Flat windows of more than this many times the smallest one's radius hold planes; a cylinder is flat in small ones."""
 LINK = 4.0
 """Points of a slice within this many spacings are connected."""
+MARGIN = 5.0
+"""A candidate, which saw a few points, may be off the axis that is asked for by so many degrees more."""
 
 
 def windows_and_flatness(
@@ -81,4 +84,15 @@ def candidates_of_slices(
     if config.candidates.polish and len(proposed):
         kept = polish_candidates(proposed, frame, radii, config.candidates)
     journal.report("candidates", len(proposed), len(kept), {"does not fit": len(proposed) - len(kept)})
+    return kept
+
+
+def candidates_along_axis(candidates: Candidates, config: Config, journal: Journal) -> Candidates:
+    """Keep the candidates about the axis that is asked for, if one is."""
+    axis = config.scene.axis
+    if axis is None:
+        return candidates
+    tolerance = np.radians(config.scene.axis_tolerance_deg + MARGIN)
+    kept = candidates.take(are_along(candidates.directions, axis, tolerance))
+    journal.report("priors", len(candidates), len(kept), {"axis out of range": len(candidates) - len(kept)})
     return kept

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from dataclasses import replace
 
 from cylx.config import Config
+from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
 from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
@@ -103,6 +105,7 @@ class Turns:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
         kept = findings
         joined = claimed = 0
+        strayed: list[Refusal] = []
         if self._config.averaging.merge:
             distinct = drop_claimed(findings, len(self._ground.points))
             pieces = merge_pieces(distinct, self._ground, self._join)
@@ -113,12 +116,16 @@ class Turns:
             joined = len(distinct) - len(pieces)
             claimed = len(findings) - joined - len(kept)
         if self._config.averaging.refine:
-            kept = [self._finish(finding) for finding in kept]
+            finished = [self._finish(finding) for finding in kept]
+            strayed = [Refusal.of(one, reason) for one in finished if (reason := self._out_of_range(one.segment))]
+            kept = [finding for finding in finished if not self._out_of_range(finding.segment)]
+            self.refused += strayed
         kept = sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))
         beyond = kept[self._config.max_cylinders :] if self._config.max_cylinders else []
         kept = kept[: len(kept) - len(beyond)]
         self.refused += [Refusal.of(finding, "beyond max_cylinders") for finding in beyond]
         rejected = {"joined": joined, "claimed by a better one": claimed, "beyond max_cylinders": len(beyond)}
+        rejected |= Counter(refusal.reason for refusal in strayed)
         journal.report("merging", len(findings), len(kept), rejected)
         return kept
 
@@ -143,13 +150,16 @@ class Turns:
 
     def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | Refusal:
         """Verify a segment; what speaks most against it if it does not pass."""
-        if not self._radii[0] <= segment.model[6] <= self._radii[1]:
-            return Refusal(segment, "radius out of range", support, payoff)
+        if reason := self._out_of_range(segment):
+            return Refusal(segment, reason, support, payoff)
         share = agreement(self._witnesses, segment)
         verdict = verify(segment, self._ground, payoff, share, self._config.verification)
-        if not verdict.measures or (self._config.verification.enabled and verdict.reason):
+        reason, limits = verdict.reason, self._config.verification
+        if verdict.measures and not limits.enabled:
+            reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""
+        if reason:
             confidence = verdict.confidence if verdict.measures else None
-            return Refusal(segment, verdict.reason, support, payoff, confidence, verdict.coverage, verdict.measures)
+            return Refusal(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
         return Finding(
             segment,
             verdict.points,
@@ -161,3 +171,12 @@ class Turns:
             verdict.tilt_error,
             verdict.measures,
         )
+
+    def _out_of_range(self, segment: Segment) -> str:
+        """Name the prior that a segment does not keep, or nothing."""
+        if not self._radii[0] <= segment.model[6] <= self._radii[1]:
+            return "radius out of range"
+        scene = self._config.scene
+        tolerance = math.radians(scene.axis_tolerance_deg)
+        astray = scene.axis is not None and not are_along(segment.model[3:6], scene.axis, tolerance)
+        return "axis out of range" if astray else ""

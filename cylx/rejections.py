@@ -1,0 +1,80 @@
+"""What was not accepted as a JSON object, `NAME.rejected.json`: with the reason, and the evidence there is.
+
+Units and keys are those of `cylx.results`; the same input, configuration and seed give the same bytes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Literal
+
+from pydantic import ConfigDict, Field, JsonValue
+
+from cylx import __version__
+from cylx.results import Input, Measured, Part, drop_missing, text_of
+
+if TYPE_CHECKING:
+    from cylx.records import Extraction, Rejection
+
+
+class Reasoned(Part):
+    """What was not accepted."""
+
+    reason: str
+    """What speaks most against it: a term of the evidence, or a limit that it does not keep."""
+
+
+class RejectedCylinder(Measured, Reasoned):  # the keys of the last one come first
+    """A shape that was taken for a cylinder, why it was not accepted, and what was measured of it until then."""
+
+    @classmethod
+    def of(cls, rejection: Rejection) -> RejectedCylinder:
+        """Write down what was not accepted."""
+        return cls(reason=rejection.reason, **cls.keys_of(rejection.fit))
+
+
+class Rejections(Part):
+    """All that was taken for a cylinder of one cloud and not accepted."""
+
+    model_config = ConfigDict(title="cylx.rejected/1")
+
+    schema_id: Literal["cylx.rejected/1"] = Field(default="cylx.rejected/1", alias="schema")
+    """Name and version of this format."""
+    cylx_version: str
+    """Version of cylx that wrote it."""
+    input: Input
+    """What was looked at."""
+    config: dict[str, JsonValue]
+    """The resolved configuration, every value."""
+    rejected: list[RejectedCylinder]
+    """What was not accepted, by confidence; what was refused before anything was measured comes last."""
+
+    @classmethod
+    def of(cls, extraction: Extraction) -> Rejections:
+        """Write down what an extraction did not accept.
+
+        Parameters
+        ----------
+        extraction : Extraction
+            What a run found out.
+        """
+        return cls(
+            cylx_version=__version__,
+            input=Input.of(extraction),
+            config=extraction.config.model_dump(mode="json"),
+            rejected=[RejectedCylinder.of(rejection) for rejection in extraction.rejected],
+        )
+
+    def to_object(self) -> dict[str, Any]:
+        """Give the JSON object; what was not computed is left out."""
+        content = self.model_dump(mode="json", by_alias=True)
+        drop_missing([content["input"], *content["rejected"]])
+        return content
+
+    def to_json(self) -> str:
+        """Give the text of the file, with a newline at its end."""
+        return text_of(self.to_object())
+
+
+def rejections_schema() -> dict[str, Any]:
+    """Give the JSON schema of the file."""
+    return Rejections.model_json_schema(by_alias=True)
