@@ -16,7 +16,7 @@ RADII = (0.0125, 0.30)
 BIN = 0.006  # radians
 DENSE = 2_500_000
 """Points from which the scanners choose: a few in each of their bins."""
-RATIOS = (0.02, 0.7)
+RATIOS = (0.02, 0.5)
 """Noise over spacing: a plant is scanned to see its pipes, of which the thinnest are hardly wider than the spacing."""
 UP, DOWN = np.array([0.0, 0, 1]), np.array([0.0, 0, -1])
 
@@ -46,14 +46,14 @@ class Rack:
 
 def plant(rng, kind, seed, points=None):
     """Make a rack of pipes between I-beams, on a floor with clutter, scanned from four sides."""
-    size = rng.uniform(2.5, 4.5)
+    size = rng.uniform(1.8, 3.2)
     rack = Rack(Sketch.empty(), np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
     top = add_layers(rng, rack, size)
     for _ in range(rng.integers(0, 6)):
         add_riser(rng, rack, size, top)
     add_building(rng, rack.sketch, size, top)
     add_ground_clutter(rng, rack.sketch, size)
-    total = points or int(10 ** rng.uniform(5.0, 5.6))
+    total = points or int(10 ** rng.uniform(5.2, 5.6))
     draft = seen_by_scanners(rng, rack.sketch, size, total)
     if rng.random() < 0.5:
         draft = with_strays(rng, draft, rng.choice([0.002, 0.01, 0.03]))
