@@ -151,7 +151,7 @@ def draw(probability, rows, path):
     top.set(ylabel="share of fits that are true", xlim=(0, 1), ylim=(-0.02, 1.02))
     bins = np.linspace(0, 1, 21)
     kinds = [probability[rows.true], probability[~rows.true]]
-    bottom.hist(kinds, bins, stacked=True, log=True, label=["true", "false"], color=["tab:blue", "tab:orange"])
+    bottom.hist(kinds, bins, histtype="step", log=True, label=["true", "false"], color=["tab:blue", "tab:orange"])
     bottom.set(xlabel="confidence, from weights found without the scene", ylabel="fits")
     bottom.legend()
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -7,6 +7,10 @@ GRAZING = 0.05
 """No point returns if the cosine between its ray and the normal is less than this."""
 
 
+STEEP = 0.2
+"""Surfaces under a smaller cosine hide a part of themselves."""
+
+
 def visible(points, normals, two_sided, view, bin_width):
     """Tell which points a scanner at `view` sees, by the nearest range in bins of azimuth and elevation.
 
@@ -38,7 +42,7 @@ def visible(points, normals, two_sided, view, bin_width):
     nearest = np.full(int(bins.max()) + 1, np.inf)
     np.minimum.at(nearest, bins[front], ranges[front])
     # over the width of a bin a surface recedes by as much as its slope says
-    clipped = np.clip(cosines, GRAZING, 1.0)
+    clipped = np.clip(cosines, STEEP, 1.0)
     slack = bin_width * ranges * (0.5 + 1.5 * np.sqrt(1.0 - clipped**2) / clipped)
     return (cosines > GRAZING) & (ranges < nearest[bins] + slack), ranges, cosines
 
