@@ -15,6 +15,7 @@ from test_architecture import EVERYTHING, MAY_IMPORT
 from cylx.cli import main
 from cylx.config import Config, load_config
 from cylx.config_text import _allowed, _scalar
+from cylx.rejections import rejections_schema
 from cylx.results import result_schema
 
 PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
@@ -151,9 +152,8 @@ def command_line():
 # --- the result
 
 
-def result_parts():
-    """Give (title, entries by key, required keys) of the result and of every object in it, in the order they come."""
-    schema = result_schema()
+def parts_of(schema):
+    """Give (title, entries by key, required keys) of a file and of every object in it, in the order they come."""
     names = [""]
     for name in names:
         part = schema["$defs"][name] if name else schema
@@ -184,10 +184,12 @@ def type_of(entry):
     return entry.get("type", "any")
 
 
-def json_format():
-    """Write every key of the result."""
+def json_format(schema=None, known=()):
+    """Write every key of the result, or of another file but for the objects that are known already."""
     parts = []
-    for name, entries, required in result_parts():
+    for name, entries, required in parts_of(schema or result_schema()):
+        if name in known:
+            continue
         rows = [
             [
                 f"`{key}`",
@@ -197,8 +199,14 @@ def json_format():
             ]
             for key, entry in entries.items()
         ]
-        parts.append(f"### {name or 'The file'}\n\n" + table(["key", "type", "always there", "meaning"], rows))
+        title = name or ("What was not accepted" if known else "The file")
+        parts.append(f"### {title}\n\n" + table(["key", "type", "always there", "meaning"], rows))
     return "\n\n".join(parts)
+
+
+def rejected_format():
+    """Write every key of the file of what was not accepted that the result does not have."""
+    return json_format(rejections_schema(), known=[name for name, _, _ in parts_of(result_schema()) if name])
 
 
 # --- the house
@@ -242,6 +250,7 @@ TABLES = {
     "presets": presets,
     "command line": command_line,
     "json format": json_format,
+    "rejected format": rejected_format,
     "rooms": rooms,
     "arrows": arrows,
 }

@@ -9,12 +9,13 @@ import click
 import pytest
 from docs_tables import PACKAGE, TABLES, commands, config_keys, config_sections, options_of
 
-from cylx import errors
+from cylx import errors, evidence
 from cylx.config import Config
 from cylx.io import annotated
+from cylx.pipeline import turns
 from cylx.records import Scene
 from cylx.scene import resolve
-from cylx.stages import verification
+from cylx.stages import averaging, verification
 
 ROOT = PACKAGE.parent
 DOCS = ROOT / "docs"
@@ -174,6 +175,16 @@ def test_every_measure_of_the_evidence_is_told_of():
         for cylinder in json.loads(golden.read_text(encoding="utf-8"))["cylinders"]:
             assert set(cylinder.get("evidence", ())) <= set(told)
     assert [key for key in told if f'"{key}":' not in inspect.getsource(verification)] == []
+
+
+def test_every_reason_of_a_rejection_is_told_of():
+    told = part(read("docs/json-format.md"), "## The rejected")
+    reasons = {term.reason for term in evidence.TERMS}
+    reasons |= set(re.findall(r'"([a-z _]+)": ', inspect.getsource(verification._refusal)))
+    for module, found in ((averaging, r'return "([a-z ]+)"'), (turns, r'"([a-z_ ]+ (?:range|one|max_cylinders))"')):
+        reasons |= set(re.findall(found, inspect.getsource(module)))
+    assert {"agreement", "bulge", "drifted away", "axis out of range", "beyond max_cylinders"} <= reasons
+    assert [reason for reason in sorted(reasons) if f"`{reason}`" not in told] == []
 
 
 def test_every_key_of_a_truth_is_told_of():
