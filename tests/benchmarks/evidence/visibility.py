@@ -1,0 +1,102 @@
+"""What scanners see of a scene: the nearest surface in each direction, and less of it the further away it is."""
+
+import numpy as np
+from solids import is_open, normals_of
+
+GRAZING = 0.05
+"""No point returns if the cosine between its ray and the normal is less than this."""
+
+
+STEEP = 0.2
+"""Surfaces under a smaller cosine hide a part of themselves."""
+
+
+def visible(points, normals, two_sided, view, bin_width):
+    """Tell which points a scanner at `view` sees, by the nearest range in bins of azimuth and elevation.
+
+    Parameters
+    ----------
+    points, normals : ndarray of shape (N, 3)
+        Points dense enough that a bin that looks at a surface holds some of it.
+    two_sided : ndarray of shape (N,), bool
+        Points of surfaces that are seen from behind as well.
+    view : ndarray of shape (3,)
+    bin_width : float
+        Radians.
+
+    Returns
+    -------
+    seen : ndarray of shape (N,), bool
+    ranges, cosines : ndarray of shape (N,)
+        Distance from the scanner, and cosine of the angle of incidence.
+    """
+    rays = points - view
+    ranges = np.linalg.norm(rays, axis=1)
+    cosines = -np.einsum("ij,ij->i", rays, normals) / ranges
+    cosines = np.where(two_sided, np.abs(cosines), cosines)
+    columns = int(2 * np.pi / bin_width)
+    azimuth = ((np.arctan2(rays[:, 1], rays[:, 0]) + np.pi) / bin_width).astype(np.int64) % columns
+    elevation = ((np.arcsin(rays[:, 2] / ranges) + 0.5 * np.pi) / bin_width).astype(np.int64)
+    bins = elevation * columns + azimuth
+    front = cosines > 0
+    nearest = np.full(int(bins.max()) + 1, np.inf)
+    np.minimum.at(nearest, bins[front], ranges[front])
+    # over the width of a bin a surface recedes by as much as its slope says
+    clipped = np.clip(cosines, STEEP, 1.0)
+    slack = bin_width * ranges * (0.5 + 1.5 * np.sqrt(1.0 - clipped**2) / clipped)
+    return (cosines > GRAZING) & (ranges < nearest[bins] + slack), ranges, cosines
+
+
+def scan(rng, points, normals, two_sided, views, bin_width, count):
+    """Choose about `count` points as scanners at `views` would: density falls with cosine over range squared.
+
+    What is scanned densest is thinned out, as is usual with scans that are put together.
+
+    Returns
+    -------
+    chosen : ndarray of shape (n,)
+        Indices of the points, n at most `count`.
+    ranges : ndarray of shape (n,)
+        Their distance from the nearest scanner that sees them.
+    """
+    density, reach = np.zeros(len(points)), np.full(len(points), np.inf)
+    for view in views:
+        seen, ranges, cosines = visible(points, normals, two_sided, view, bin_width)
+        density += np.where(seen, cosines / ranges**2, 0.0)
+        reach = np.where(seen, np.minimum(reach, ranges), reach)
+    low, high = 0.0, count / max(float(density.max()), 1e-300) * 1e6
+    for _ in range(60):  # the factor that makes of densities, cut off at one, so many points
+        factor = 0.5 * (low + high)
+        low, high = (low, factor) if np.minimum(factor * density, 1.0).sum() > count else (factor, high)
+    chosen = np.flatnonzero(rng.random(len(points)) < np.minimum(low * density, 1.0))
+    return chosen, reach[chosen]
+
+
+def scanned(rng, sketch, views, *, bin_width, dense, count):
+    """Give what scanners see of a sketch.
+
+    Parameters
+    ----------
+    sketch : Sketch
+    views : sequence of ndarray of shape (3,)
+        Where the scanners are.
+    bin_width : float
+        Directions that are nearer to each other hide each other, radians.
+    dense : int
+        Points to choose from: enough for some in each bin.
+    count : int
+        Points to choose, at most.
+
+    Returns
+    -------
+    draft : Draft
+    ranges : ndarray of shape (n,)
+        Distance of each point from the nearest scanner that sees it.
+    """
+    clouds = sketch.clouds(rng, dense)
+    surfaces = [part.surface for part in sketch.parts]
+    normals = np.concatenate([normals_of(surface, cloud) for surface, cloud in zip(surfaces, clouds, strict=True)])
+    two_sided = np.repeat([is_open(surface) for surface in surfaces], [len(cloud) for cloud in clouds])
+    whole = sketch.draft(clouds)
+    chosen, ranges = scan(rng, whole.points, normals, two_sided, views, bin_width, count)
+    return whole._replace(points=whole.points[chosen], labels=whole.labels[chosen]), ranges
