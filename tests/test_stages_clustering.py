@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cylx.config import ClusteringConfig, load_config
 from cylx.records import Candidates, Segment
-from cylx.stages.clustering import CandidateGame, agreement, thin_candidates
+from cylx.stages.clustering import CandidateGame, Neighbourhood, thin_candidates
 
 seeds = st.integers(0, 2**32 - 1)
 PAPER = load_config(preset="paper").clustering
@@ -155,11 +155,11 @@ def test_a_cylinder_explains_the_candidates_that_say_so():
 def test_agreement_counts_the_windows_inside_a_cylinder():
     candidates, owner = crowd(6, strays=0)
     segment = Segment(AXES[0].copy(), 2.0, 0.01)
-    assert agreement(candidates, segment) == (30, 30)
+    assert Neighbourhood(candidates).agreement(segment) == (30, 30)
     turned = candidates.models.copy()
     turned[np.flatnonzero(owner == 0)[:12], 6] *= 1.5
-    assert agreement(make(turned), segment) == (18, 30)
-    assert agreement(make(np.empty((0, 7))), segment) == (0, 0)
+    assert Neighbourhood(make(turned)).agreement(segment) == (18, 30)
+    assert Neighbourhood(make(np.empty((0, 7)))).agreement(segment) == (0, 0)
 
 
 @settings(max_examples=20, deadline=None)

@@ -44,12 +44,15 @@ class Kernel(NamedTuple):
         Factor a step, at most 1.
     tuning : float
         Half width in standard deviations of the weighted residuals; infinite: a fixed schedule.
+    tolerance : float
+        The fit ends when a step is shorter than this share of the spread, and the width has settled.
     """
 
     start: float
     floor: float
     decay: float
     tuning: float
+    tolerance: float = 1e-9
 
 
 @njit(cache=True, nogil=True)
@@ -135,7 +138,7 @@ def fit_in_place(
 ) -> float:
     """Fit `model` = (point, direction, radius), shape (7,), to points[:n] whose height lies in [low, high].
 
-    Heights are measured from the model's point along its direction. `schedule` (5,) has what a `Kernel` has, and the
+    Heights are measured from the model's point along its direction. `schedule` (6,) has what a `Kernel` has, and the
     most steps. `normal` (5, 5), `right` (5,) and `frame` (2, 3)
     are scratch.
 
@@ -144,10 +147,10 @@ def fit_in_place(
     float
         Standard deviation of the weighted residuals at the last step; negative if the fit broke down.
     """
-    width, floor, decay, tuning = schedule[0], schedule[1], schedule[2], schedule[3]
+    width, floor, decay, tuning, tolerance = schedule[0], schedule[1], schedule[2], schedule[3], schedule[4]
     spread = width / 3.0
     row, sums = np.empty(5), np.empty(3)
-    for _ in range(int(schedule[4])):
+    for _ in range(int(schedule[5])):
         _accumulate(points, n, model, low, high, width, normal, right, frame, row, sums)
         if sums[0] < 8.0 or not solve_in_place(normal, right):
             return -1.0
@@ -155,10 +158,10 @@ def fit_in_place(
         size = _advance(model, right, frame, sums[2])
         if not (0.0 < model[6] < 1e12):
             return -1.0
-        # a fixed schedule needs no more than its floor; the estimate of a final fit is iterated to its fixed point
-        if (decay == 1.0 and size < 1e-9 * spread) or (width <= floor and size < 1e-2 * spread and decay < 1.0):
-            break
+        last = width
         width = max(floor, min(decay * width, tuning * spread))
+        if size < tolerance * spread and abs(width - last) <= tolerance * width:
+            break
     return float(spread)
 
 
@@ -273,10 +276,10 @@ def polish(
         2 if it does, 1 if it is badly supported, 0 if it does not fit.
     """
     matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    bins, schedule = np.empty(36, np.int64), np.empty(5)
+    bins, schedule = np.empty(36, np.int64), np.empty(6)
     floor = max(3.0 * noise, 0.01 * model[6])
     schedule[0], schedule[1], schedule[2] = max(0.3 * model[6], 4.0 * noise), floor, 0.6
-    schedule[3], schedule[4] = math.inf, POLISH_STEPS
+    schedule[3], schedule[4], schedule[5] = math.inf, 1e-2, POLISH_STEPS
     spread = fit_in_place(points, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
     if spread < 0.0 or spread > SHARP * floor or not (least <= model[6] <= greatest):
         return 0

@@ -167,6 +167,7 @@ def search_ellipse(
     tolerance: float,
     semi_minor: tuple[float, float],
     max_aspect: float,
+    refits: int = 3,
 ) -> tuple[Ellipse, NDArray[np.bool_]] | Degenerate:
     """Find the ellipse that most points support: RANSAC over samples of five, then direct fits to the support.
 
@@ -181,6 +182,8 @@ def search_ellipse(
         Least and greatest semi-minor axis.
     max_aspect : float
         Greatest semi_major / semi_minor.
+    refits : int
+        Direct fits to the support, at most.
 
     Returns
     -------
@@ -200,7 +203,7 @@ def search_ellipse(
         return Degenerate("no ellipse within the limits")
     ellipse = Ellipse(*shape)
     inliers = np.abs(ellipse_distances(ellipse, offsets)) < tolerance
-    for _ in range(3):
+    for _ in range(refits):
         refined = fit_ellipse(offsets[inliers])
         if isinstance(refined, Degenerate):
             break

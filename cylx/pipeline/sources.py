@@ -65,6 +65,7 @@ def ellipses_of_slices(
             tolerance=tolerance,
             radius_range=radii,
             rng=np.random.default_rng([config.seed, 3, index]),
+            refits=0 if config.candidates.polish else 3,  # the polish sees the points in space
         )
 
     with ThreadPoolExecutor(threads) as pool:

@@ -13,7 +13,7 @@ from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
 from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
-from cylx.stages.clustering import CandidateGame, agreement, is_contradicted
+from cylx.stages.clustering import CandidateGame, Neighbourhood, is_contradicted
 from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
 
@@ -62,7 +62,7 @@ class Turns:
     ) -> None:
         self._game = game
         self._players = players
-        self._witnesses = witnesses
+        self._witnesses = Neighbourhood(witnesses)
         self._ground = ground
         self._radii = radii
         self._config = config
@@ -113,7 +113,7 @@ class Turns:
         """Fit an average and judge it: the finding, or why it is none."""
         cluster, average = candidate
         support, payoff = len(cluster.members), cluster.payoff
-        if self._config.verification.enabled and is_contradicted(agreement(self._witnesses, average)):
+        if self._config.verification.enabled and is_contradicted(self._witnesses.agreement(average)):
             return Refusal(average, "agreement", support, payoff)
         fitted = self._fit(average)
         if isinstance(fitted, str):
@@ -180,7 +180,7 @@ class Turns:
         """Verify a segment; what speaks most against it if it does not pass."""
         if reason := self._out_of_range(segment):
             return Refusal(segment, reason, support, payoff)
-        share = agreement(self._witnesses, segment)
+        share = self._witnesses.agreement(segment)
         verdict = verify(segment, self._ground, payoff, share, self._config.verification)
         reason, limits = verdict.reason, self._config.verification
         if verdict.measures and not limits.enabled:

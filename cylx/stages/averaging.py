@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 GROWTH_STEPS = 8
+ROUGH = 0.02
+"""While a cylinder grows, a fit may end at steps of this share of the spread."""
 ENOUGH = 6000
 """Points that suffice while a cylinder grows."""
 MANY = 20000
@@ -93,7 +95,7 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         if len(points) < 20:
             return "too few points"
         stride = max(1, len(points) // ENOUGH)
-        kernel = Kernel(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+        kernel = Kernel(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH)
         end = BEYOND * half
         fit = fit_cylinder(points[::stride], model, low=-end, high=end, kernel=kernel, steps=12 if step else 25)
         if fit is None:

@@ -49,6 +49,7 @@ class CandidateGame:
         self._config = config
         self._candidates = candidates
         self._alive = np.ones(len(candidates), np.bool_)
+        self._places = Neighbourhood(candidates)
         self._dropped = {"too small": 0, "too little payoff": 0}
         self._clusters = 0
         self._patience = PATIENCE
@@ -116,12 +117,8 @@ class CandidateGame:
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
         """Give the candidates still in the game that a cylinder accounts for, or that say closely the same."""
-        offset, angle, radius = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
-        found = np.empty(len(self._candidates), np.int64)
-        reach = segment.half + segment.model[6]
-        cosine = math.cos(math.radians(angle))
-        n = _pick_agreeing(self._candidates.models, self._alive, segment.model, reach, offset, cosine, radius, found)
-        return found[:n]
+        limits = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
+        return self._places.agreeing(segment, self._alive, *limits)
 
     def report(self) -> StageReport:
         """Count the candidates that came in, the clusters, and what was dropped."""
@@ -152,27 +149,58 @@ class CandidateGame:
         return None
 
 
-def agreement(windows: Candidates, segment: Segment) -> tuple[int, int]:
-    """Count the windows inside a cylinder that agree with it, and all of them.
-
-    An edge of a beam borrows the few hypotheses that happen to agree; of a pipe's nearly all do.
+class Neighbourhood:
+    """Candidates by place: finds those along a cylinder without looking at all.
 
     Parameters
     ----------
-    windows : Candidates
-        Drawn evenly over the surface.
-    segment : Segment
-
-    Returns
-    -------
-    consistent, near : int
+    candidates : Candidates
     """
-    seen = WITNESS * min(segment.model[6], 1.2 * segment.half)
-    cosine = math.cos(math.radians(6.0))
-    consistent, near = _count_agreeing(
-        windows.models, windows.windows, segment.model, segment.half, seen, 0.15, cosine, 0.1
-    )
-    return int(consistent), int(near)
+
+    def __init__(self, candidates: Candidates) -> None:
+        self._order = np.argsort(candidates.models[:, 0], kind="stable")
+        self._models = np.ascontiguousarray(candidates.models[self._order])
+        self._windows = candidates.windows[self._order]
+
+    def agreement(self, segment: Segment) -> tuple[int, int]:
+        """Count the windows inside a cylinder that agree with it, and all of them.
+
+        An edge of a beam borrows the few hypotheses that happen to agree; of a pipe's nearly all do.
+
+        Parameters
+        ----------
+        segment : Segment
+
+        Returns
+        -------
+        consistent, near : int
+        """
+        seen = WITNESS * min(segment.model[6], 1.2 * segment.half)
+        part = self._beside(segment, segment.half)
+        limits = 0.15, math.cos(math.radians(6.0)), 0.1
+        consistent, near = _count_agreeing(
+            self._models[part], self._windows[part], segment.model, segment.half, seen, *limits
+        )
+        return int(consistent), int(near)
+
+    def agreeing(
+        self, segment: Segment, alive: NDArray[np.bool_], offset: float, angle_deg: float, radius: float
+    ) -> IndexArray:
+        """Give those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
+        reach = segment.half + float(segment.model[6])
+        part = self._beside(segment, reach)
+        found = np.empty(part.stop - part.start, np.int64)
+        cosine = math.cos(math.radians(angle_deg))
+        n = _pick_agreeing(
+            self._models[part], self._order[part], alive, segment.model, reach, offset, cosine, radius, found
+        )
+        return found[:n]
+
+    def _beside(self, segment: Segment, reach: float) -> slice:
+        """Give those that a cylinder as long as this may hold."""
+        x, width = float(segment.model[0]), abs(float(segment.model[3])) * reach + float(segment.model[6])
+        first, last = np.searchsorted(self._models[:, 0], [x - width, x + width])
+        return slice(int(first), int(last))
 
 
 def is_contradicted(counts: tuple[int, int]) -> bool:
@@ -224,6 +252,7 @@ def _count_agreeing(
 @njit(cache=True, nogil=True)
 def _pick_agreeing(
     models: FloatArray,
+    order: IndexArray,
     alive: NDArray[np.bool_],
     model: FloatArray,
     reach: float,
@@ -234,8 +263,8 @@ def _pick_agreeing(
 ) -> int:
     n = 0
     for i in range(len(models)):
-        if alive[i] and _agrees(models[i], model, reach, offset, cosine, radius) > 1:
-            found[n] = i
+        if alive[order[i]] and _agrees(models[i], model, reach, offset, cosine, radius) > 1:
+            found[n] = order[i]
             n += 1
     return n
 

@@ -23,6 +23,7 @@ def fit_ellipses(
     tolerance: float,
     radius_range: tuple[float, float],
     rng: np.random.Generator,
+    refits: int = 3,
 ) -> list[EllipseFit]:
     """Find all ellipses of one slice, one after the other in each piece of it, taking away what an ellipse explains.
 
@@ -40,6 +41,8 @@ def fit_ellipses(
         Least and greatest semi-minor axis, which is the cylinder's radius.
     rng : numpy.random.Generator
         Of this slice alone.
+    refits : int
+        Direct fits of an ellipse to its support, at most.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def fit_ellipses(
         points = section.points[piece]
         while len(points) >= min_points and len(found) < config.max_per_slice:
             samples = rng.integers(len(points), size=(config.iterations, 5))
-            fit = search_ellipse(points, samples, tolerance, radius_range, config.max_aspect)
+            fit = search_ellipse(points, samples, tolerance, radius_range, config.max_aspect, refits)
             if isinstance(fit, Degenerate):
                 break
             ellipse, inliers = fit
