@@ -77,6 +77,7 @@ TERMS = (
     # what the candidates say
     Term("payoff", 3.193, 0.75, lambda m: m["payoff"]),
     Term("agreement", 8.954, 0.88, lambda m: m["agreement"]),
+    Term("yield", 3.0, 0.75, lambda m: m["yield"]),
     # cones; and whatever is too short to be told from a sphere
     Term("slope", -21.66, 0.0, _slope),
     Term("bulge unknown", -26.708, 0.0, lambda m: min(m["bulge_error"], 1.0)),
@@ -102,7 +103,7 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     --------
     >>> pipe = dict(noise_ratio=1.0, structure=0.0, structure_radii=0.0, inside=0.0, outside=0.0, tangent=0.0,
     ...             coverage=6.0, inliers=2000.0, height_radii=9.0, payoff=0.8, agreement=0.95, slope=0.0,
-    ...             slope_error=0.001, bulge_error=0.01)
+    ...             **{"yield": 0.8}, slope_error=0.001, bulge_error=0.01)
     >>> weigh(pipe)[0] > 0.99
     True
     >>> confidence, worst = weigh({**pipe, "agreement": 0.1, "payoff": 0.3})

@@ -9,17 +9,17 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "cli", "config", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "noise", "payoff",
-    "pipeline", "records", "rejections", "results",
-    "scene", "stages", "synthetic",
+    "api", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "noise",
+    "payoff", "pipeline", "records", "rejections", "results", "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},
     "__main__": {"cli"},
     "cli": EVERYTHING,
     "api": {"config", "errors", "io", "pipeline", "records"},
-    "pipeline": {"config", "errors", "game", "geometry", "records", "scene", "stages"},
-    "stages": {"config", "errors", "evidence", "game", "geometry", "payoff", "records"},
+    "consensus": {"records"},
+    "pipeline": {"config", "consensus", "errors", "game", "geometry", "records", "scene", "stages"},
+    "stages": {"config", "consensus", "errors", "evidence", "game", "geometry", "payoff", "records"},
     "noise": {"geometry"},
     "payoff": {"game", "geometry"},
     "scene": {"config", "errors", "geometry", "noise", "records"},

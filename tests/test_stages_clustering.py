@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx.config import ClusteringConfig, load_config
+from cylx.consensus import Neighbourhood
 from cylx.records import Candidates, Segment
-from cylx.stages.clustering import CandidateGame, Neighbourhood, thin_candidates
+from cylx.stages.clustering import CandidateGame, thin_candidates
 
 seeds = st.integers(0, 2**32 - 1)
 PAPER = load_config(preset="paper").clustering

@@ -92,7 +92,7 @@ def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verifie
             frame.to_scene(segment.cylinder),
             len(residuals),
             float(np.sqrt((residuals**2).sum() / max(len(residuals), 1))) * frame.spacing,
-            refusal.coverage if refusal.measures else covered_angle(angles)[0],
+            refusal.coverage if refusal.measures else covered_angle(angles),
             refusal.support,
             refusal.payoff,
             refusal.confidence if verified else None,

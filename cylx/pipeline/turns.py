@@ -9,11 +9,12 @@ from dataclasses import replace
 from itertools import repeat
 
 from cylx.config import Config
+from cylx.consensus import Neighbourhood, Yield, is_contradicted
 from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
+from cylx.records import Candidates, Cluster, Finding, Ground, Looks, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
-from cylx.stages.clustering import CandidateGame, Neighbourhood, is_contradicted
+from cylx.stages.clustering import CandidateGame
 from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
 
@@ -25,6 +26,26 @@ ROUND = 16
 """Clusters fitted at the same time; the number does not depend on that of the threads, and so the result does not."""
 
 
+WIDE = 0.1
+"""Windows within this many radii of a surface, at least, are on it."""
+
+
+class Witnesses:
+    """Who may speak for and against a cylinder.
+
+    Parameters
+    ----------
+    candidates : Candidates
+        Drawn evenly over the surface.
+    looks : Looks
+        All windows, fruitful or not.
+    """
+
+    def __init__(self, candidates: Candidates, looks: Looks) -> None:
+        self.near = Neighbourhood(candidates)
+        self.looks = Yield(looks)
+
+
 class Turns:
     """The loop over clusters.
 
@@ -33,7 +54,7 @@ class Turns:
     game : CandidateGame
     players : Candidates
         Those in the game.
-    witnesses : Candidates
+    witnesses : Witnesses
         What a cylinder should agree with: all curved windows, which are drawn evenly over the surface.
     ground : Ground
         The cloud.
@@ -54,7 +75,7 @@ class Turns:
         self,
         game: CandidateGame,
         players: Candidates,
-        witnesses: Candidates,
+        witnesses: Witnesses,
         ground: Ground,
         radii: tuple[float, float],
         config: Config,
@@ -62,7 +83,7 @@ class Turns:
     ) -> None:
         self._game = game
         self._players = players
-        self._witnesses = Neighbourhood(witnesses)
+        self._witnesses = witnesses
         self._ground = ground
         self._radii = radii
         self._config = config
@@ -113,7 +134,7 @@ class Turns:
         """Fit an average and judge it: the finding, or why it is none."""
         cluster, average = candidate
         support, payoff = len(cluster.members), cluster.payoff
-        if self._config.verification.enabled and is_contradicted(self._witnesses.agreement(average)):
+        if self._config.verification.enabled and is_contradicted(self._witnesses.near.agreement(average)):
             return Refusal(average, "agreement", support, payoff)
         fitted = self._fit(average)
         if isinstance(fitted, str):
@@ -180,8 +201,9 @@ class Turns:
         """Verify a segment; what speaks most against it if it does not pass."""
         if reason := self._out_of_range(segment):
             return Refusal(segment, reason, support, payoff)
-        share = self._witnesses.agreement(segment)
-        verdict = verify(segment, self._ground, payoff, share, self._config.verification)
+        width = max(3.0 * self._ground.noise_about(segment.model, segment.half), WIDE * float(segment.model[6]))
+        counts = (*self._witnesses.near.agreement(segment), *self._witnesses.looks.of(segment, width))
+        verdict = verify(segment, self._ground, payoff, counts, self._config.verification)
         reason, limits = verdict.reason, self._config.verification
         if verdict.measures and not limits.enabled:
             reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""

@@ -10,10 +10,10 @@ import heapq
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import ClusteringConfig
+from cylx.consensus import Neighbourhood
 from cylx.game import SparsePayoff, evolve
 from cylx.payoff import local_payoff, screw_payoff
 from cylx.records import Candidates, Cluster, Segment, StageReport
@@ -29,9 +29,6 @@ CROWD = 400
 
 PATIENCE = 3
 """Where all play, this many small clusters in a row end it: the paper says only "until all are extracted"."""
-WITNESS = 0.4
-"""Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
-smaller."""
 
 
 class CandidateGame:
@@ -147,126 +144,6 @@ class CandidateGame:
             self.withdraw(np.array([i]))
             return np.concatenate(([i], columns)).astype(np.int64)
         return None
-
-
-class Neighbourhood:
-    """Candidates by place: finds those along a cylinder without looking at all.
-
-    Parameters
-    ----------
-    candidates : Candidates
-    """
-
-    def __init__(self, candidates: Candidates) -> None:
-        self._order = np.argsort(candidates.models[:, 0], kind="stable")
-        self._models = np.ascontiguousarray(candidates.models[self._order])
-        self._windows = candidates.windows[self._order]
-
-    def agreement(self, segment: Segment) -> tuple[int, int]:
-        """Count the windows inside a cylinder that agree with it, and all of them.
-
-        An edge of a beam borrows the few hypotheses that happen to agree; of a pipe's nearly all do.
-
-        Parameters
-        ----------
-        segment : Segment
-
-        Returns
-        -------
-        consistent, near : int
-        """
-        seen = WITNESS * min(segment.model[6], 1.2 * segment.half)
-        part = self._beside(segment, segment.half)
-        limits = 0.15, math.cos(math.radians(6.0)), 0.1
-        consistent, near = _count_agreeing(
-            self._models[part], self._windows[part], segment.model, segment.half, seen, *limits
-        )
-        return int(consistent), int(near)
-
-    def agreeing(
-        self, segment: Segment, alive: NDArray[np.bool_], offset: float, angle_deg: float, radius: float
-    ) -> IndexArray:
-        """Give those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
-        reach = segment.half + float(segment.model[6])
-        part = self._beside(segment, reach)
-        found = np.empty(part.stop - part.start, np.int64)
-        cosine = math.cos(math.radians(angle_deg))
-        n = _pick_agreeing(
-            self._models[part], self._order[part], alive, segment.model, reach, offset, cosine, radius, found
-        )
-        return found[:n]
-
-    def _beside(self, segment: Segment, reach: float) -> slice:
-        """Give those that a cylinder as long as this may hold."""
-        x, width = float(segment.model[0]), abs(float(segment.model[3])) * reach + float(segment.model[6])
-        first, last = np.searchsorted(self._models[:, 0], [x - width, x + width])
-        return slice(int(first), int(last))
-
-
-def is_contradicted(counts: tuple[int, int]) -> bool:
-    """Tell from the counts of `agreement` whether so many windows disagree that a fit would be in vain.
-
-    Of true cylinders nearly all windows agree, a third at the very least; a fifth is not reached by chance.
-    """
-    consistent, near = counts
-    return near >= 12 and consistent + math.sqrt(max(consistent, 1.0)) < 0.2 * near
-
-
-@njit(cache=True, nogil=True)
-def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cosine: float, radius: float) -> int:
-    """Tell of a candidate whether it lies within `reach` of a cylinder's middle (1), and whether it agrees, too (2).
-
-    Offset in the cylinder's radii, cosine of the angle, relative radius.
-    """
-    dx, dy, dz = row[0] - model[0], row[1] - model[1], row[2] - model[2]
-    height = dx * model[3] + dy * model[4] + dz * model[5]
-    square = dx * dx + dy * dy + dz * dz - height * height
-    if abs(height) >= reach or square >= model[6] * model[6]:
-        return 0
-    if square >= (offset * model[6]) ** 2 or abs(row[6] / model[6] - 1.0) >= radius:
-        return 1
-    turn = row[3] * model[3] + row[4] * model[4] + row[5] * model[5]
-    return 2 if abs(turn) > cosine else 1
-
-
-@njit(cache=True, nogil=True)
-def _count_agreeing(
-    models: FloatArray,
-    windows: FloatArray,
-    model: FloatArray,
-    reach: float,
-    seen: float,
-    offset: float,
-    cosine: float,
-    radius: float,
-) -> tuple[int, int]:
-    consistent, near = 0, 0
-    for i in range(len(models)):
-        if windows[i] > seen:
-            level = _agrees(models[i], model, reach, offset, cosine, radius)
-            near += 1 if level > 0 else 0
-            consistent += 1 if level > 1 else 0
-    return consistent, near
-
-
-@njit(cache=True, nogil=True)
-def _pick_agreeing(
-    models: FloatArray,
-    order: IndexArray,
-    alive: NDArray[np.bool_],
-    model: FloatArray,
-    reach: float,
-    offset: float,
-    cosine: float,
-    radius: float,
-    found: IndexArray,
-) -> int:
-    n = 0
-    for i in range(len(models)):
-        if alive[order[i]] and _agrees(models[i], model, reach, offset, cosine, radius) > 1:
-            found[n] = order[i]
-            n += 1
-    return n
 
 
 def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:

@@ -25,6 +25,8 @@ PIECES = 10
 TRUNCATED = 0.9866
 """Standard deviation of a Gaussian cut off at three sigmas."""
 SECTORS = 36
+ARC_SHARE = 0.3
+"""Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
 LEAST = 20
 """Points on the surface without which nothing can be measured."""
 MANY = 20000
@@ -116,7 +118,7 @@ def verify(
     segment: Segment,
     ground: Ground,
     payoff: float,
-    agreement: tuple[int, int],
+    counts: tuple[int, int, int, int],
     config: VerificationConfig,
 ) -> Verdict:
     """Measure a segment and judge it.
@@ -129,8 +131,9 @@ def verify(
         The cloud.
     payoff : float
         Mean payoff of its cluster.
-    agreement : tuple of int
-        Curvature windows along it that agree with it, and all of them.
+    counts : tuple of int
+        Candidates of windows along it that agree with it, and all of them; windows on its surface that gave a
+        candidate like it, and all of them.
     config : VerificationConfig
 
     Returns
@@ -142,14 +145,14 @@ def verify(
     shell = whole.thinned(max(1, len(points) // MANY))
     if shell.on.sum() < LEAST:
         return Verdict("too few points", 0.0, {}, 0.0, points)
-    coverage, sectors = covered_angle(shell.angles[shell.on])
+    coverage = covered_angle(shell.angles[shell.on])
     radius = float(segment.model[6])
     noise = ground.noise_about(segment.model, segment.half)
     deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
     shape = _shape(shell, segment, deviation)
     lack, structure = _lack_of_fit(shell, deviation)
     inside, outside = _emptiness(shell, radius)
-    consistent, near = agreement
+    consistent, near, fruitful, looked = counts
     measures = {
         "noise_ratio": deviation / noise,
         "lack_of_fit": lack,
@@ -157,7 +160,7 @@ def verify(
         "structure_radii": structure / radius,
         "inside": inside,
         "outside": outside,
-        "tangent": _tangent(shell, sectors, radius),
+        "tangent": _tangent(shell, radius),
         "curvature": shape["curvature"],
         "slope": shape["slope"],
         "slope_error": shape["slope_error"],
@@ -166,6 +169,8 @@ def verify(
         "height_radii": 2.0 * segment.half / radius,
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
+        "looks": float(looked),
+        "yield": (fruitful + 1.0) / (looked + 2.0),
     }
     probability, worst = weigh({**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff})
     confidence = round(probability, 3)  # further digits would order equals by chance
@@ -185,22 +190,22 @@ def _refusal(measures: dict[str, float], count: int, coverage: float, config: Ve
     return next((name for name, broken in limits.items() if broken), "")
 
 
-def covered_angle(angles: FloatArray) -> tuple[float, MaskArray]:
-    """Give the angle that points cover about an axis, and which of the sectors do.
+def covered_angle(angles: FloatArray) -> float:
+    """Give the angle that points cover about an axis, radians.
 
-    A sector counts if it holds at least 15 % of what a typical filled one does. The angle is summed over finer sectors
-    than the mask has where there are points enough for it.
+    A sector counts if it holds at least 15 % of what a typical filled one does. Sectors are finer where
+    there are points enough for it.
     """
     if len(angles) == 0:
-        return 0.0, np.zeros(SECTORS, np.bool_)
+        return 0.0
     fine = int(np.clip(len(angles) // 20, SECTORS, 360))
-    return float(_filled(angles, fine).mean()) * 2.0 * math.pi, _filled(angles, SECTORS)
+    return float(_filled(angles, fine).mean()) * 2.0 * math.pi
 
 
-def _filled(angles: FloatArray, sectors: int) -> MaskArray:
+def _filled(angles: FloatArray, sectors: int, share: float = 0.15) -> MaskArray:
     index = ((angles / (2.0 * np.pi) + 0.5) * sectors).astype(np.int64) % sectors
     counts = np.bincount(index, minlength=sectors)
-    return np.asarray(counts > max(0.5, 0.15 * float(np.median(counts[counts > 0]))), dtype=np.bool_)
+    return np.asarray(counts > max(0.5, share * float(np.median(counts[counts > 0]))), dtype=np.bool_)
 
 
 def _sector(angles: FloatArray) -> NDArray[np.int64]:
@@ -267,12 +272,14 @@ def _emptiness(shell: Shell, radius: float) -> tuple[float, float]:
     )
 
 
-def _tangent(shell: Shell, filled: MaskArray, radius: float) -> float:
+def _tangent(shell: Shell, radius: float) -> float:
     """Give the density of points that go on tangentially past both ends of the arc, as a share of the arc's own.
 
     A rounded edge of a box goes on as its two sides; a pipe ends.
     """
-    closed = filled.copy()
+    middle = np.abs(shell.heights) <= 0.8
+    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
+    closed = _filled(shell.angles[on], SECTORS, ARC_SHARE) if on.any() else np.zeros(SECTORS, np.bool_)
     for _ in range(2):  # gaps of up to two sectors are not ends
         for step in (1, 2):
             closed |= np.roll(closed, 1) & np.roll(closed, -step)
@@ -281,19 +288,19 @@ def _tangent(shell: Shell, filled: MaskArray, radius: float) -> float:
     start, length = _longest_run(closed)
     if length >= SECTORS - 3:
         return 0.0
-    middle = np.abs(shell.heights) <= 0.8
     width = 2.0 * math.pi / SECTORS
-    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
     counts = np.bincount(_sector(shell.angles[on]), minlength=SECTORS)
     density = max(float(counts[(start + np.arange(length)) % SECTORS].sum()) / length, 1e-9)
     low = -math.pi + start * width
-    reach = math.radians(40.0)
+    # sectors that are a little filled count as arc, so that it may have ended up to this much before
+    reach, early = math.radians(20.0), math.radians(25.0)
     shares = []
     for end, sign in ((low, -1.0), (low + length * width, 1.0)):
         past = (sign * (shell.angles - end) + math.pi) % (2.0 * math.pi) - math.pi
-        top = radius * (1.0 / np.cos(np.clip(past + math.radians(10.0), 0.0, reach)) - 1.0) + 4.0 * shell.deviation
-        along = middle & (past > 0) & (past < reach) & (shell.residuals > -3.0 * shell.deviation)
-        shares.append(float((along & (shell.residuals < top)).sum()) / (reach / width) / density)
+        least = radius * (1.0 / np.cos(np.clip(past, 0.0, reach)) - 1.0) - 4.0 * shell.deviation
+        most = radius * (1.0 / np.cos(np.clip(past, 0.0, reach) + early) - 1.0) + 4.0 * shell.deviation
+        along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
+        shares.append(float(along.sum()) / (reach / width) / density)
     return min(shares)
 
 

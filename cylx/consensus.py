@@ -1,0 +1,210 @@
+"""What the candidates say of a cylinder: who agrees with it, of those that would have to."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.records import Candidates, Looks, Segment
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+WITNESS = 0.4
+"""Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
+smaller."""
+TOO_LARGE = 2.9
+"""Windows above this many radii see more beside a cylinder than of it."""
+SAME = 0.15, math.cos(math.radians(6.0)), 0.1
+"""A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
+
+
+def least_telling(segment: Segment) -> float:
+    """Give the radius from which a window can tell a cylinder."""
+    return float(WITNESS * min(segment.model[6], 1.2 * segment.half))
+
+
+class Neighbourhood:
+    """Candidates by place: finds those along a cylinder without looking at all.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    """
+
+    def __init__(self, candidates: Candidates) -> None:
+        self._order = np.argsort(candidates.models[:, 0], kind="stable")
+        self._models = np.ascontiguousarray(candidates.models[self._order])
+        self._windows = candidates.windows[self._order]
+
+    def agreement(self, segment: Segment) -> tuple[int, int]:
+        """Count the windows inside a cylinder that agree with it, and all of them.
+
+        An edge of a beam borrows the few hypotheses that happen to agree; of a pipe's nearly all do.
+
+        Parameters
+        ----------
+        segment : Segment
+
+        Returns
+        -------
+        consistent, near : int
+        """
+        seen = least_telling(segment)
+        part = self._beside(segment, segment.half)
+        consistent, near = _count_agreeing(
+            self._models[part], self._windows[part], segment.model, segment.half, seen, *SAME
+        )
+        return int(consistent), int(near)
+
+    def agreeing(
+        self, segment: Segment, alive: NDArray[np.bool_], offset: float, angle_deg: float, radius: float
+    ) -> IndexArray:
+        """Give those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
+        reach = segment.half + float(segment.model[6])
+        part = self._beside(segment, reach)
+        found = np.empty(part.stop - part.start, np.int64)
+        cosine = math.cos(math.radians(angle_deg))
+        n = _pick_agreeing(
+            self._models[part], self._order[part], alive, segment.model, reach, offset, cosine, radius, found
+        )
+        return found[:n]
+
+    def _beside(self, segment: Segment, reach: float) -> slice:
+        """Give those that a cylinder as long as this may hold."""
+        x, width = float(segment.model[0]), abs(float(segment.model[3])) * reach + float(segment.model[6])
+        first, last = np.searchsorted(self._models[:, 0], [x - width, x + width])
+        return slice(int(first), int(last))
+
+
+class Yield:
+    """All windows that were looked at, by place: finds those on the surface of a cylinder, fruitful or not.
+
+    Parameters
+    ----------
+    looks : Looks
+    """
+
+    def __init__(self, looks: Looks) -> None:
+        order = np.argsort(looks.places[:, 0], kind="stable")
+        self._places = np.ascontiguousarray(looks.places[order])
+        self._windows, self._models = looks.windows[order], np.ascontiguousarray(looks.models[order])
+
+    def of(self, segment: Segment, width: float) -> tuple[int, int]:
+        """Count the windows on the surface of a cylinder that gave a candidate like it, and all of them.
+
+        Of a pipe nearly all windows give it; along an edge most give nothing.
+
+        Parameters
+        ----------
+        segment : Segment
+        width : float
+            Greatest distance of a window's middle from the surface.
+
+        Returns
+        -------
+        consistent, near : int
+        """
+        model, half = segment.model, segment.half
+        span = abs(float(model[3])) * half + float(model[6]) + width
+        first, last = np.searchsorted(self._places[:, 0], [model[0] - span, model[0] + span])
+        part = slice(int(first), int(last))
+        sizes = least_telling(segment), TOO_LARGE * float(model[6])
+        places, windows, models = self._places[part], self._windows[part], self._models[part]
+        consistent, near = _count_fruitful(places, windows, models, model, half, width, sizes, SAME)
+        return int(consistent), int(near)
+
+
+def is_contradicted(counts: tuple[int, int]) -> bool:
+    """Tell from the counts of `agreement` whether so many windows disagree that a fit would be in vain.
+
+    Of true cylinders nearly all windows agree, a third at the very least; a fifth is not reached by chance.
+    """
+    consistent, near = counts
+    return near >= 12 and consistent + math.sqrt(max(consistent, 1.0)) < 0.2 * near
+
+
+@njit(cache=True, nogil=True)
+def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cosine: float, radius: float) -> int:
+    """Tell of a candidate whether it lies within `reach` of a cylinder's middle (1), and whether it agrees, too (2).
+
+    Offset in the cylinder's radii, cosine of the angle, relative radius.
+    """
+    dx, dy, dz = row[0] - model[0], row[1] - model[1], row[2] - model[2]
+    height = dx * model[3] + dy * model[4] + dz * model[5]
+    square = dx * dx + dy * dy + dz * dz - height * height
+    if abs(height) >= reach or square >= model[6] * model[6]:
+        return 0
+    if square >= (offset * model[6]) ** 2 or abs(row[6] / model[6] - 1.0) >= radius:
+        return 1
+    turn = row[3] * model[3] + row[4] * model[4] + row[5] * model[5]
+    return 2 if abs(turn) > cosine else 1
+
+
+@njit(cache=True, nogil=True)
+def _count_agreeing(
+    models: FloatArray,
+    windows: FloatArray,
+    model: FloatArray,
+    reach: float,
+    seen: float,
+    offset: float,
+    cosine: float,
+    radius: float,
+) -> tuple[int, int]:
+    consistent, near = 0, 0
+    for i in range(len(models)):
+        if windows[i] > seen:
+            level = _agrees(models[i], model, reach, offset, cosine, radius)
+            near += 1 if level > 0 else 0
+            consistent += 1 if level > 1 else 0
+    return consistent, near
+
+
+@njit(cache=True, nogil=True)
+def _pick_agreeing(
+    models: FloatArray,
+    order: IndexArray,
+    alive: NDArray[np.bool_],
+    model: FloatArray,
+    reach: float,
+    offset: float,
+    cosine: float,
+    radius: float,
+    found: IndexArray,
+) -> int:
+    n = 0
+    for i in range(len(models)):
+        if alive[order[i]] and _agrees(models[i], model, reach, offset, cosine, radius) > 1:
+            found[n] = order[i]
+            n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def _count_fruitful(
+    places: FloatArray,
+    windows: FloatArray,
+    models: FloatArray,
+    model: FloatArray,
+    half: float,
+    width: float,
+    sizes: tuple[float, float],
+    same: tuple[float, float, float],
+) -> tuple[int, int]:
+    consistent, near = 0, 0
+    for i in range(len(places)):
+        if not (sizes[0] < windows[i] < sizes[1]):
+            continue
+        dx, dy, dz = places[i, 0] - model[0], places[i, 1] - model[1], places[i, 2] - model[2]
+        height = dx * model[3] + dy * model[4] + dz * model[5]
+        distance = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height))
+        if abs(height) > half or abs(distance - model[6]) > width:
+            continue
+        near += 1
+        if models[i, 6] > 0.0 and _agrees(models[i], model, math.inf, same[0], same[1], same[2]) > 1:
+            consistent += 1
+    return consistent, near
