@@ -92,7 +92,6 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
 def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
     """Fit one cylinder to two pieces; None if it does not explain both."""
     one, two = a.segment, b.segment
-    noise = ground.noise_about(one.model, one.half)
     if abs(one.model[3:6] @ two.model[3:6]) < COSINE:
         return None
     if min(one.model[6], two.model[6]) < RADIUS_RATIO * max(one.model[6], two.model[6]):
@@ -110,6 +109,7 @@ def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | Non
     model = one.model.copy()
     model[:3] += 0.5 * (low + high) * model[3:6]
     half = 0.5 * (high - low)
+    noise = ground.noise_about(one.model, one.half)
     kernel = Kernel(max(0.1 * model[6], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
     pieces = [ground.points[finding.points[:: 1 + len(finding.points) // ENOUGH]] for finding in (a, b)]
     fit = fit_cylinder(np.concatenate(pieces), model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=30)
