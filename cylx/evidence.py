@@ -63,24 +63,23 @@ def _slope(measures: Mapping[str, float]) -> float:
     return min(max(0.0, abs(measures["slope"]) - 2.0 * measures["slope_error"]), 0.3)
 
 
-BIAS = -11.782
+BIAS = -11.863
 TERMS = (
-    Term("noise", -5.600, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    Term("noise", -5.800, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
     # other points inside, just outside, and going on past both ends of the arc
-    Term("inside", -0.197, 0.07, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -0.449, 0.31, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
-    Term("tangent", -3.731, 0.03, lambda m: min(m["tangent"], 1.5)),
+    Term("inside", -0.073, 0.07, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -0.706, 0.29, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
+    Term("tangent", -4.627, 0.03, lambda m: min(m["tangent"], 1.5)),
     # how much of a cylinder is there at all
-    Term("coverage", 2.099, 0.96, lambda m: min(m["coverage"], math.pi) / math.pi),
-    Term("too few points", 0.436, 2.57, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
-    Term("height", 3.236, 1.35, lambda m: _log(m["height_radii"], 0.1, 4.0)),
+    Term("coverage", 3.240, 0.96, lambda m: min(m["coverage"], math.pi) / math.pi),
+    Term("too few points", 0.284, 2.55, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
+    Term("height", 3.153, 1.34, lambda m: _log(m["height_radii"], 0.1, 4.0)),
     # what the candidates say
-    Term("payoff", 4.217, 0.81, lambda m: m["payoff"]),
-    Term("agreement", 6.223, 0.85, lambda m: m["agreement"]),
-    Term("yield", 2.126, 0.64, lambda m: m["yield"]),
+    Term("payoff", 4.681, 0.81, lambda m: m["payoff"]),
+    Term("agreement", 6.552, 0.86, lambda m: m["agreement"]),
     # cones; and whatever is too short to be told from a sphere
-    Term("slope", -33.539, 0.00, _slope),
-    Term("bulge unknown", -17.114, 0.00, lambda m: min(m["bulge_error"], 1.0)),
+    Term("slope", -33.397, 0.00, _slope),
+    Term("bulge unknown", -41.023, 0.00, lambda m: min(m["bulge_error"], 1.0)),
 )
 
 
@@ -103,7 +102,7 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     --------
     >>> pipe = dict(noise_ratio=1.0, structure=0.0, structure_radii=0.0, inside=0.0, outside=0.0, tangent=0.0,
     ...             coverage=6.0, inliers=2000.0, height_radii=9.0, payoff=0.8, agreement=0.95, slope=0.0,
-    ...             **{"yield": 0.8}, slope_error=0.001, bulge_error=0.01)
+    ...             slope_error=0.001, bulge_error=0.01)
     >>> weigh(pipe)[0] > 0.99
     True
     >>> confidence, worst = weigh({**pipe, "agreement": 0.1, "payoff": 0.3})

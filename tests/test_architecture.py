@@ -9,8 +9,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "measures",
-    "noise", "payoff", "pipeline", "records", "rejections", "results", "scene", "stages", "synthetic",
+    "api", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io",
+    "measures", "noise", "payoff", "pipeline", "records", "rejections", "results", "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},

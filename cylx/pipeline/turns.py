@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import Config
-from cylx.consensus import Neighbourhood, Yield, is_contradicted
+from cylx.consensus import Neighbourhood, is_contradicted
 from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, Cluster, Finding, Ground, Looks, Refusal, Segment
+from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
@@ -31,26 +31,6 @@ ROUND = 16
 """Clusters fitted at the same time; the number does not depend on that of the threads, and so the result does not."""
 
 
-WIDE = 0.1
-"""Windows within this many radii of a surface, at least, are on it."""
-
-
-class Witnesses:
-    """Who may speak for and against a cylinder.
-
-    Parameters
-    ----------
-    candidates : Candidates
-        Drawn evenly over the surface.
-    looks : Looks
-        All windows, fruitful or not.
-    """
-
-    def __init__(self, candidates: Candidates, looks: Looks) -> None:
-        self.near = Neighbourhood(candidates)
-        self.looks = Yield(looks)
-
-
 class Turns:
     """The loop over clusters.
 
@@ -59,7 +39,7 @@ class Turns:
     game : CandidateGame
     players : Candidates
         Those in the game.
-    witnesses : Witnesses
+    witnesses : Candidates
         What a cylinder should agree with: all curved windows, which are drawn evenly over the surface.
     ground : Ground
         The cloud.
@@ -80,7 +60,7 @@ class Turns:
         self,
         game: CandidateGame,
         players: Candidates,
-        witnesses: Witnesses,
+        witnesses: Candidates,
         ground: Ground,
         radii: tuple[float, float],
         config: Config,
@@ -88,7 +68,7 @@ class Turns:
     ) -> None:
         self._game = game
         self._players = players
-        self._witnesses = witnesses
+        self._witnesses = Neighbourhood(witnesses)
         self._ground = ground
         self._radii = radii
         self._config = config
@@ -139,7 +119,7 @@ class Turns:
         """Fit an average and judge it: the finding, or why it is none."""
         cluster, average = candidate
         support, payoff = len(cluster.members), cluster.payoff
-        if self._config.verification.enabled and is_contradicted(self._witnesses.near.agreement(average)):
+        if self._config.verification.enabled and is_contradicted(self._witnesses.agreement(average)):
             return Refusal(average, "agreement", support, payoff)
         fitted = self._fit(average)
         if isinstance(fitted, str):
@@ -206,8 +186,7 @@ class Turns:
         """Verify a segment; what speaks most against it if it does not pass."""
         if reason := self._out_of_range(segment):
             return Refusal(segment, reason, support, payoff)
-        width = max(3.0 * self._ground.noise_about(segment.model, segment.half), WIDE * float(segment.model[6]))
-        counts = (*self._witnesses.near.agreement(segment), *self._witnesses.looks.of(segment, width))
+        counts = self._witnesses.agreement(segment)
         verdict = verify(segment, self._ground, payoff, counts, self._config.verification)
         reason, limits = verdict.reason, self._config.verification
         if verdict.measures and not limits.enabled:

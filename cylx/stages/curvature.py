@@ -19,7 +19,7 @@ from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
 from cylx.geometry.small_matrices import fill_frame
-from cylx.records import Candidates, Explained, Frame, Looks, Octave, StageReport
+from cylx.records import Candidates, Explained, Frame, Octave, StageReport
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -39,7 +39,7 @@ COLUMNS = 9
 
 def find_curved_windows(
     frame: Frame, radius_range: tuple[float, float], config: CandidatesConfig, threads: int
-) -> tuple[Candidates, Explained, Looks, StageReport]:
+) -> tuple[Candidates, Explained, StageReport]:
     """Propose a cylinder for each window whose points are curved one way.
 
     Parameters
@@ -56,13 +56,10 @@ def find_curved_windows(
     candidates : Candidates
     explained : Explained
         Which points lie in flat windows, and which on candidates.
-    looks : Looks
-        All windows with points enough.
     report : StageReport
     """
     explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
     parts: list[Candidates] = []
-    looks: list[Looks] = []
     counts = np.zeros(len(OUTCOMES), np.int64)
     for radius in reversed(frame.window_radii(config.octave)):
         octave = Octave.of(frame, radius, explained.flatness == 0)
@@ -75,8 +72,6 @@ def find_curved_windows(
         flat = outcome == 1
         if flat.any():
             _mark_flat(frame, octave, seeds[flat], planes[flat], explained.flatness)
-        models = np.where((outcome == 5)[:, None], rows[:, :7], 0.0)[outcome > 0]
-        looks.append(Looks(octave.points[seeds[outcome > 0]], np.full(len(models), radius), models))
         good = rows[outcome == 5]
         parts.append(
             Candidates(
@@ -89,7 +84,7 @@ def find_curved_windows(
         )
     found = Candidates.joined(parts)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:5], counts[:5], strict=True) if n}
-    return found, explained, Looks.joined(looks), StageReport("curvature", int(counts.sum()), len(found), rejected)
+    return found, explained, StageReport("curvature", int(counts.sum()), len(found), rejected)
 
 
 def _look(

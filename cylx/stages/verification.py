@@ -56,7 +56,7 @@ def verify(
     segment: Segment,
     ground: Ground,
     payoff: float,
-    counts: tuple[int, int, int, int],
+    counts: tuple[int, int],
     config: VerificationConfig,
 ) -> Verdict:
     """Measure a segment and judge it.
@@ -70,8 +70,7 @@ def verify(
     payoff : float
         Mean payoff of its cluster.
     counts : tuple of int
-        Candidates of windows along it that agree with it, and all of them; windows on its surface that gave a
-        candidate like it, and all of them.
+        Candidates of windows along it that agree with it, and all of them.
     config : VerificationConfig
 
     Returns
@@ -90,7 +89,7 @@ def verify(
     shape = shape_of(shell, segment, deviation)
     lack, structure = lack_of_fit(shell, deviation)
     inside, outside = emptiness(shell, radius)
-    consistent, near, fruitful, looked = counts
+    consistent, near = counts
     measures = {
         "noise_ratio": deviation / noise,
         "lack_of_fit": lack,
@@ -107,8 +106,6 @@ def verify(
         "height_radii": 2.0 * segment.half / radius,
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
-        "looks": float(looked),
-        "yield": (fruitful + 1.0) / (looked + 2.0),
     }
     probability, worst = weigh({**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff})
     confidence = round(probability, 3)  # further digits would order equals by chance
