@@ -187,6 +187,7 @@ def test_every_stage_is_told_of_with_its_reasons():
     assert set(told) == set(re.findall(r'(?:\.report|StageReport)\("([a-z ]+)"', source))
     reasons = {("curvature", reason) for reason in curvature.OUTCOMES[:-1]}
     reasons |= {("local slicing", reason) for reason in local_slices.COUNTS[1:]}
+    reasons |= {("verification", turns.FOUND_BEFORE)}
     for golden in (ROOT / "sample_data" / "golden").glob("*.json"):
         for stage in json.loads(golden.read_text(encoding="utf-8"))["stages"]:
             reasons |= {(stage["name"], reason) for reason in stage["rejected"]}
