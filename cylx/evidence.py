@@ -63,24 +63,24 @@ def _slope(measures: Mapping[str, float]) -> float:
     return min(max(0.0, abs(measures["slope"]) - 2.0 * measures["slope_error"]), 0.3)
 
 
-BIAS = -8.918
+BIAS = -11.782
 TERMS = (
-    Term("noise", -7.070, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    Term("noise", -5.600, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
     # other points inside, just outside, and going on past both ends of the arc
-    Term("inside", -0.400, 0.06, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -1.115, 0.16, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
-    Term("tangent", -0.901, 0.01, lambda m: min(m["tangent"], 1.5)),
+    Term("inside", -0.197, 0.07, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -0.449, 0.31, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
+    Term("tangent", -3.731, 0.03, lambda m: min(m["tangent"], 1.5)),
     # how much of a cylinder is there at all
-    Term("coverage", 0.523, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
-    Term("too few points", 0.686, 2.56, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
-    Term("height", 1.296, 1.31, lambda m: _log(m["height_radii"], 0.1, 4.0)),
+    Term("coverage", 2.099, 0.96, lambda m: min(m["coverage"], math.pi) / math.pi),
+    Term("too few points", 0.436, 2.57, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
+    Term("height", 3.236, 1.35, lambda m: _log(m["height_radii"], 0.1, 4.0)),
     # what the candidates say
-    Term("payoff", 3.193, 0.75, lambda m: m["payoff"]),
-    Term("agreement", 8.954, 0.88, lambda m: m["agreement"]),
-    Term("yield", 3.0, 0.75, lambda m: m["yield"]),
+    Term("payoff", 4.217, 0.81, lambda m: m["payoff"]),
+    Term("agreement", 6.223, 0.85, lambda m: m["agreement"]),
+    Term("yield", 2.126, 0.64, lambda m: m["yield"]),
     # cones; and whatever is too short to be told from a sphere
-    Term("slope", -21.66, 0.0, _slope),
-    Term("bulge unknown", -26.708, 0.0, lambda m: min(m["bulge_error"], 1.0)),
+    Term("slope", -33.539, 0.00, _slope),
+    Term("bulge unknown", -17.114, 0.00, lambda m: min(m["bulge_error"], 1.0)),
 )
 
 

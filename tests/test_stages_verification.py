@@ -6,9 +6,10 @@ import pytest
 from cylx.config import Config, VerificationConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
+from cylx.measures import covered_angle, look_at
 from cylx.records import Ground, Noise, Segment
 from cylx.scene import make_frame
-from cylx.stages.verification import covered_angle, look_at, verify
+from cylx.stages.verification import verify
 from cylx.synthetic.surfaces import Frustum, Mantle, Sphere
 
 SIGMA = 0.01

@@ -8,6 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cylx.config import Config
 from cylx.consensus import Neighbourhood, Yield, is_contradicted
 from cylx.geometry.lines import are_along
@@ -15,8 +18,10 @@ from cylx.pipeline.journal import Journal
 from cylx.records import Candidates, Cluster, Finding, Ground, Looks, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
-from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
+from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
+
+FloatArray = NDArray[np.float64]
 
 FOUND_BEFORE = "found before"
 """The reason of a segment that is one of those accepted already; it is no other cylinder."""
@@ -98,7 +103,7 @@ class Turns:
         rejected: Counter[str] = Counter()
         with ThreadPoolExecutor(self._threads) as pool:
             while clusters := self._next_clusters():
-                known = tuple(finding.segment for finding in findings)
+                known = as_rows([finding.segment for finding in findings])
                 for outcome in list(pool.map(self._try, clusters, repeat(known))):
                     found = self._new_or_known(outcome, findings)
                     if isinstance(found, Finding):
@@ -130,7 +135,7 @@ class Turns:
                 self._game.withdraw(self._game.explained_by(average, closely=True))
         return clusters
 
-    def _try(self, candidate: tuple[Cluster, Segment], known: tuple[Segment, ...]) -> Finding | Refusal:
+    def _try(self, candidate: tuple[Cluster, Segment], known: FloatArray) -> Finding | Refusal:
         """Fit an average and judge it: the finding, or why it is none."""
         cluster, average = candidate
         support, payoff = len(cluster.members), cluster.payoff
@@ -139,7 +144,7 @@ class Turns:
         fitted = self._fit(average)
         if isinstance(fitted, str):
             return Refusal(average, fitted, support, payoff)
-        if self._removes and any(is_part_of(fitted, segment) for segment in known):
+        if self._removes and is_part_of(fitted, known):
             return Refusal(fitted, FOUND_BEFORE, support, payoff)
         return self._judge(fitted, support, payoff)
 
@@ -147,8 +152,8 @@ class Turns:
         """Refuse a finding that another cluster of the same round has led to before."""
         if not (self._removes and isinstance(found, Finding)):
             return found
-        known = any(is_part_of(found.segment, finding.segment) for finding in findings)
-        return Refusal.of(found, FOUND_BEFORE) if known else found
+        known = as_rows([finding.segment for finding in findings[-ROUND:]])
+        return Refusal.of(found, FOUND_BEFORE) if is_part_of(found.segment, known) else found
 
     def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
