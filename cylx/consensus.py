@@ -16,6 +16,8 @@ IndexArray = NDArray[np.int64]
 WITNESS = 0.4
 """Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
 smaller."""
+CONCENTRIC = 0.85
+"""A candidate on the same axis that is thinner or thicker than this is one of another surface."""
 SAME = 0.15, math.cos(math.radians(6.0)), 0.1
 """A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
 
@@ -98,10 +100,13 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
     square = dx * dx + dy * dy + dz * dz - height * height
     if abs(height) >= reach or square >= model[6] * model[6]:
         return 0
-    if square >= (offset * model[6]) ** 2 or abs(row[6] / model[6] - 1.0) >= radius:
-        return 1
     turn = row[3] * model[3] + row[4] * model[4] + row[5] * model[5]
-    return 2 if abs(turn) > cosine else 1
+    if square >= (offset * model[6]) ** 2 or abs(turn) <= cosine:
+        return 1
+    ratio = row[6] / model[6]
+    if abs(ratio - 1.0) < radius:
+        return 2
+    return 1 if CONCENTRIC < ratio < 1.0 / CONCENTRIC else 0  # a pipe within a pipe speaks for itself
 
 
 @njit(cache=True, nogil=True)

@@ -90,6 +90,14 @@ def test_equal_indices_in_two_scenes_are_two_cylinders():
     assert logistic.shared_weights(rows) == pytest.approx([0.5, 0.5, 1.0, 1.0])
 
 
+def test_kinds_of_scenes_weigh_the_same_however_many_fits_they_have():
+    scenes = np.array(["room1"] * 6 + ["plant1"] * 1 + ["plant12"] * 1)
+    rows = logistic.Rows(np.zeros((8, 1)), np.zeros(8, bool), scenes, np.full(8, -1))
+    weights = logistic.balanced_weights(rows)
+    assert weights.sum() == pytest.approx(8)
+    assert weights[:6].sum() == pytest.approx(weights[6:].sum())
+
+
 @given(st.lists(st.sampled_from("abcdefghijkl"), min_size=1, max_size=80))
 def test_a_scene_is_never_in_two_folds(names):
     fold = logistic.folds_of(np.array(names), 4)

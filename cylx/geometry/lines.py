@@ -117,7 +117,7 @@ def fit_line(points: FloatArray, n: int, reach: float, place: FloatArray, direct
         total[0], total[1], total[2], count = 0.0, 0.0, 0.0, 0
         for i in range(n):
             square = points[i, 0] ** 2 + points[i, 1] ** 2 + points[i, 2] ** 2
-            chosen[i] = square < reach * reach and off_line(points, i, place, direction) < width
+            chosen[i] = square < reach * reach and off_line(points, i, place, direction) <= width
             if chosen[i]:
                 count += 1
                 for d in range(3):
@@ -142,7 +142,7 @@ def fit_line(points: FloatArray, n: int, reach: float, place: FloatArray, direct
         across = math.sqrt(max(matrix[0, 0] + matrix[1, 1] + matrix[2, 2] - matrix[longest, longest], 0.0))
         for d in range(3):
             direction[d] = vectors[d, longest]
-        width = 2.5 * across
+        width = 2.5 * across + 1e-9 * along  # points may lie on the line exactly
     return across, along
 
 

@@ -11,7 +11,7 @@ FloatArray = NDArray[np.float64]
 
 @njit(cache=True, nogil=True)
 def sort_in_place(values: FloatArray, n: int) -> None:
-    """Sort values[:n], ascending: Shell's method with Ciura's gaps, quick to compile."""
+    """Sort values[:n], ascending: Shell's method with Knuth's gaps, quick to compile."""
     gap = 1
     while gap < n // 3:
         gap = 3 * gap + 1

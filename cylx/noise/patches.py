@@ -31,7 +31,7 @@ def half_sample_mode(values: FloatArray) -> float:
     return float(np.exp(logs.mean()))
 
 
-def quadric_spread(patches: FloatArray) -> tuple[FloatArray, FloatArray]:
+def quadric_spread(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit a quadric over the plane of each patch by least squares.
 
     Parameters
@@ -40,18 +40,19 @@ def quadric_spread(patches: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     Returns
     -------
-    deviations, widths : ndarray of shape (m,)
-        Standard deviation of the residuals, k - 6 degrees of freedom; in-plane root mean square.
+    deviations, widths, least : ndarray of shape (m,)
+        Standard deviation of the residuals, k - 6 degrees of freedom; in-plane root mean square, and that along the
+        narrower of the two directions: a filament is long, but no surface.
     """
-    design, height, width = _over_own_plane(patches)
+    design, height, width, narrow = _over_own_plane(patches)
     residuals = _residuals(design, height, np.ones_like(height))
     count = patches.shape[1]
-    return np.sqrt((residuals**2).mean(axis=1) * count / (count - 6)), width
+    return np.sqrt((residuals**2).mean(axis=1) * count / (count - 6)), width, narrow
 
 
 def core_spread(patches: FloatArray) -> FloatArray:
     """Give the scatter of the core of each patch about its quadric, by the median: outliers move it little."""
-    design, height, _ = _over_own_plane(patches)
+    design, height, _, _ = _over_own_plane(patches)
     weights = np.ones_like(height)
     residuals = height
     for _ in range(8):  # least absolute residuals first, then the core about them
@@ -66,15 +67,16 @@ def core_spread(patches: FloatArray) -> FloatArray:
     return np.asarray(1.4826 * _masked_median(np.abs(residuals), core)[:, 0] * freedom)
 
 
-def _over_own_plane(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give design matrix (m, k, 6), heights (m, k) and in-plane rms (m,) of patches over their principal planes."""
+def _over_own_plane(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Give design matrix (m, k, 6), heights (m, k), in-plane rms and the least rms in the plane, (m,), of patches."""
     offsets = patches - patches.mean(axis=1, keepdims=True)
     _, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", offsets, offsets))
     height, x, y = (np.einsum("mki,mi->mk", offsets, axes[:, :, a]) for a in (0, 1, 2))
     width = np.sqrt((x * x + y * y).mean(axis=1))
+    narrow = np.sqrt((x * x).mean(axis=1))  # eigenvectors come by ascending eigenvalue
     scale = np.where(width > 0, width, 1.0)[:, None]
     x, y = x / scale, y / scale
-    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1), height, width
+    return np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=-1), height, width, narrow
 
 
 def _residuals(design: FloatArray, height: FloatArray, weights: FloatArray) -> FloatArray:

@@ -23,7 +23,8 @@ NEIGHBOURS = (48, 96, 192)
 WIDE = 4.0
 """A patch is wide if its in-plane rms exceeds its thickness this many times."""
 FLAT = 8.0
-"""A patch says something of the noise of its place if it is wide this many times: what is thicker may be no surface."""
+"""A patch says something of the noise of its place if it is wide this many times, and half as many across: what is
+thicker may be no surface."""
 
 
 class Patches(NamedTuple):
@@ -81,10 +82,10 @@ def measure_surface(
         if size < 9:
             continue
         near, radius = _nearest(points, cells, starts, unit * 2.0**level, sample[todo], size)
-        sd, width = quadric_spread(points[near])
+        sd, width, narrow = quadric_spread(points[near])
         wide = width > WIDE * sd
         spread[todo[wide]] = sd[wide]
-        flat[todo[wide]] = width[wide] > FLAT * sd[wide]
+        flat[todo[wide]] = (width > FLAT * sd)[wide] & (narrow > 0.5 * FLAT * sd)[wide]
         size_of[todo[wide]] = radius[wide]
         third = np.flatnonzero(wide)[::3] if wide.any() else np.arange(0, len(todo), 3)
         deviation[todo[third]] = core_spread(points[near[third]])

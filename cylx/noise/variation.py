@@ -14,6 +14,8 @@ from cylx.noise.patches import MAD_SHRINKAGE, core_spread, half_sample_mode, qua
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
+MOST = 4.0
+"""No place is taken for this many times noisier than usual: what scatters more is no surface."""
 AGREED = 16
 """Patches that a cell needs to say something of its own noise."""
 PIECES, PATCH = 600, 64
@@ -43,7 +45,7 @@ def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tup
     """
     none = np.empty((0, 3), np.int64), np.empty(0)
     side = 1.01 * extent
-    while len(places) >= AGREED:
+    for _ in range(20):
         corner = np.floor(places / (0.5 * side)).astype(np.int64)
         cells, owner = np.unique(corner, axis=0, return_inverse=True)
         if len(places) < 2 * AGREED * len(cells):
@@ -59,7 +61,7 @@ def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tup
         mode = half_sample_mode(own)
         known[c] = (np.abs(np.log(own / mode)) < 0.3).mean() >= 0.6
         # what is less may be the scatter of the estimate; and a quiet floor says nothing of what stands on it
-        factors[c] = mode if known[c] and mode > 1.3 else 1.0
+        factors[c] = min(mode, MOST) if known[c] and mode > 1.3 else 1.0
     if not (factors != 1.0).any():
         return side, *none
     return side, cells[known], factors[known]
@@ -84,7 +86,7 @@ def noise_by_size(
         _fill_patches(points, cells, starts, unit * 2.0**level, sample, size, patches, full)
         if full.mean() < 0.5:
             break
-        sd, width = quadric_spread(patches[full])
+        sd, width, _ = quadric_spread(patches[full])
         value = np.maximum(np.minimum(sd, core_spread(patches[full]) / MAD_SHRINKAGE), 1e-12 * spacing)
         covariance = np.einsum("mki,mkj->mij", *2 * (patches[full] - patches[full].mean(axis=1, keepdims=True),))
         thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 0], 0.0) / PATCH)

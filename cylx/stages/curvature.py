@@ -27,8 +27,6 @@ MaskArray = NDArray[np.bool_]
 
 CAPACITY = 2048
 """Most points of a window; thinned windows over one surface hold about 600."""
-ENOUGH = 250
-"""Points of a window that suffice; it uses fewer than twice as many."""
 FEW_SEEDS = 3000
 """Octaves with fewer windows than this get them more closely."""
 FLAT_SHARE = 0.9
@@ -156,7 +154,7 @@ def _scan(
     quality = np.empty(5)
     for s in range(len(seeds)):
         seed, model, noise = points[seeds[s]], rows[s, :7], noises[s]
-        n = _thinned(found, gather_ball(points, cells, starts, side, seed, 2.0 * radius, found))
+        n = gather_ball(points, cells, starts, side, seed, 2.0 * radius, found)
         m = _center_window(points, found, n, seed, radius, around, inner)
         if m < 12 or n < 20:
             outcome[s] = 0
@@ -181,19 +179,6 @@ def _scan(
         _mark_explained(around, found, n, model, 3.0 * noise, axes, marks)
         move_to_foot(model, seed)
         rows[s, 7], rows[s, 8] = quality[0], quality[1]
-
-
-@njit(cache=True, nogil=True)
-def _thinned(found: IndexArray, n: int) -> int:
-    """Keep every so manyth of the indices where there are many more than a fit needs; count them."""
-    stride = n // ENOUGH
-    if stride < 2:
-        return n
-    m = 0
-    for a in range(0, n, stride):
-        found[m] = found[a]
-        m += 1
-    return m
 
 
 @njit(cache=True, nogil=True)

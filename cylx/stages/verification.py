@@ -89,6 +89,7 @@ def verify(
     shape = shape_of(shell, segment, deviation)
     lack, structure = lack_of_fit(shell, deviation)
     inside, outside = emptiness(shell, radius)
+    both, either = continuation(shell, radius)
     consistent, near = counts
     measures = {
         "noise_ratio": deviation / noise,
@@ -97,7 +98,8 @@ def verify(
         "structure_radii": structure / radius,
         "inside": inside,
         "outside": outside,
-        "tangent": continuation(shell, radius),
+        "tangent": both,
+        "tangent_one": either,
         "curvature": shape["curvature"],
         "slope": shape["slope"],
         "slope_error": shape["slope_error"],

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 from labels import FALSE, TRUE
-from logistic import Rows, cross_validated, fit_law, shared_weights
+from logistic import Rows, balanced_weights, cross_validated, fit_law
 from scores import average_precision, brier, calibration, cylinders_found, log_loss, rates
 
 sys.path.append(str(Path(__file__).parents[1]))
@@ -56,7 +56,7 @@ def signs_of(terms):
 
 def written(law, rows, terms=TERMS):
     """Write a law as the lines of `cylx/evidence.py` that it changes; `usual` is the mean over true cylinders."""
-    share = shared_weights(rows) * rows.true
+    share = balanced_weights(rows) * rows.true
     usual = share @ rows.terms / share.sum()
     lines = [f"BIAS = {law.bias:.3f}"]
     lines += [
@@ -68,7 +68,7 @@ def written(law, rows, terms=TERMS):
 
 def quality(probability, rows):
     """Give the numbers that two sets of terms are compared by."""
-    share = shared_weights(rows)
+    share = balanced_weights(rows)
     return {
         "log_loss": log_loss(probability, rows.true, share),
         "brier": brier(probability, rows.true, share),

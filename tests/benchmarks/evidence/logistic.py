@@ -59,6 +59,14 @@ def shared_weights(rows):
     return np.where(rows.true, 1.0 / np.maximum(counts[group], 1.0), 1.0)
 
 
+def balanced_weights(rows):
+    """Let all kinds of scenes weigh the same, too; the kind is the name of a scene without its number."""
+    share = shared_weights(rows)
+    kinds, which = np.unique([name.rstrip("0123456789") for name in rows.scenes], return_inverse=True)
+    totals = np.bincount(which.reshape(-1), share)
+    return share * (share.sum() / len(kinds) / totals)[which.reshape(-1)]
+
+
 def fit_law(rows, signs, strength=STRENGTH):
     """Fit the most likely law whose weights have the given signs, or are zero.
 
@@ -77,7 +85,7 @@ def fit_law(rows, signs, strength=STRENGTH):
     middle, width = rows.terms.mean(axis=0), rows.terms.std(axis=0)
     width = np.where(width > 0, width, 1.0)  # a term that never changes gets no weight, by the penalty
     standard = (rows.terms - middle) / width
-    share = shared_weights(rows)
+    share = balanced_weights(rows)
     side = np.where(rows.true, 1.0, -1.0)
 
     def loss(parameters):
