@@ -108,9 +108,10 @@ def test_members_of_the_end_exclude_nobody_among_them(dynamics, seed, n):
 
 
 @settings(max_examples=25, deadline=None)
-@given(seeds, st.lists(st.integers(4, 12), min_size=1, max_size=4, unique=True))
-def test_both_dynamics_end_in_the_same_state(seed, sizes):
-    payoff, _ = camps(seed, sizes)
+@given(seeds, st.lists(st.integers(4, 7), max_size=3, unique=True))
+def test_both_dynamics_end_in_the_same_state_where_one_camp_is_far_the_best(seed, sizes):
+    # of camps nearly as good as each other either may win: there are several stable states
+    payoff, _ = camps(seed, [*sizes, 12], within=(0.8, 1.0))
     slow, quick = (settle(payoff, dynamics) for dynamics in PATIENT)
     assert np.allclose(slow, quick, rtol=0, atol=2e-3)
     assert np.isclose(slow @ payoff @ slow, quick @ payoff @ quick, rtol=1e-6)
