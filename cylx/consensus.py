@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.records import Candidates, Looks, Segment
+from cylx.records import Candidates, Segment
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -16,8 +16,6 @@ IndexArray = NDArray[np.int64]
 WITNESS = 0.4
 """Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
 smaller."""
-TOO_LARGE = 2.9
-"""Windows above this many radii see more beside a cylinder than of it."""
 SAME = 0.15, math.cos(math.radians(6.0)), 0.1
 """A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
 
@@ -78,44 +76,6 @@ class Neighbourhood:
         x, width = float(segment.model[0]), abs(float(segment.model[3])) * reach + float(segment.model[6])
         first, last = np.searchsorted(self._models[:, 0], [x - width, x + width])
         return slice(int(first), int(last))
-
-
-class Yield:
-    """All windows that were looked at, by place: finds those on the surface of a cylinder, fruitful or not.
-
-    Parameters
-    ----------
-    looks : Looks
-    """
-
-    def __init__(self, looks: Looks) -> None:
-        order = np.argsort(looks.places[:, 0], kind="stable")
-        self._places = np.ascontiguousarray(looks.places[order])
-        self._windows, self._models = looks.windows[order], np.ascontiguousarray(looks.models[order])
-
-    def of(self, segment: Segment, width: float) -> tuple[int, int]:
-        """Count the windows on the surface of a cylinder that gave a candidate like it, and all of them.
-
-        Of a pipe nearly all windows give it; along an edge most give nothing.
-
-        Parameters
-        ----------
-        segment : Segment
-        width : float
-            Greatest distance of a window's middle from the surface.
-
-        Returns
-        -------
-        consistent, near : int
-        """
-        model, half = segment.model, segment.half
-        span = abs(float(model[3])) * half + float(model[6]) + width
-        first, last = np.searchsorted(self._places[:, 0], [model[0] - span, model[0] + span])
-        part = slice(int(first), int(last))
-        sizes = least_telling(segment), TOO_LARGE * float(model[6])
-        places, windows, models = self._places[part], self._windows[part], self._models[part]
-        consistent, near = _count_fruitful(places, windows, models, model, half, width, sizes, SAME)
-        return int(consistent), int(near)
 
 
 def is_contradicted(counts: tuple[int, int]) -> bool:
@@ -182,29 +142,3 @@ def _pick_agreeing(
             found[n] = order[i]
             n += 1
     return n
-
-
-@njit(cache=True, nogil=True)
-def _count_fruitful(
-    places: FloatArray,
-    windows: FloatArray,
-    models: FloatArray,
-    model: FloatArray,
-    half: float,
-    width: float,
-    sizes: tuple[float, float],
-    same: tuple[float, float, float],
-) -> tuple[int, int]:
-    consistent, near = 0, 0
-    for i in range(len(places)):
-        if not (sizes[0] < windows[i] < sizes[1]):
-            continue
-        dx, dy, dz = places[i, 0] - model[0], places[i, 1] - model[1], places[i, 2] - model[2]
-        height = dx * model[3] + dy * model[4] + dz * model[5]
-        distance = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height))
-        if abs(height) > half or abs(distance - model[6]) > width:
-            continue
-        near += 1
-        if models[i, 6] > 0.0 and _agrees(models[i], model, math.inf, same[0], same[1], same[2]) > 1:
-            consistent += 1
-    return consistent, near

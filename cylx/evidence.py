@@ -63,24 +63,31 @@ def _slope(measures: Mapping[str, float]) -> float:
     return min(max(0.0, abs(measures["slope"]) - 2.0 * measures["slope_error"]), 0.3)
 
 
-BIAS = -8.918
+def _stubbiness(measures: Mapping[str, float]) -> float:
+    """Give how much shorter than four radii it is, as a negative logarithm, as far as candidates disagree.
+
+    A strip of a sphere or of an elbow is short, too, but its candidates do not agree with it as those of a tin do.
+    """
+    return math.log(min(max(measures["height_radii"], 0.1), 4.0) / 4.0) * (1.0 - measures["agreement"])
+
+
+BIAS = -6.857
 TERMS = (
-    Term("noise", -7.070, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    Term("noise", -4.751, 0.06, lambda m: _log(_thickness(m), 1.0, 20.0)),
     # other points inside, just outside, and going on past both ends of the arc
-    Term("inside", -0.400, 0.06, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -1.115, 0.16, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
-    Term("tangent", -0.901, 0.01, lambda m: min(m["tangent"], 1.5)),
+    Term("inside", -0.249, 0.07, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -0.709, 0.28, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
+    Term("tangent", -4.754, 0.03, lambda m: min(m["tangent"], 1.5)),
     # how much of a cylinder is there at all
-    Term("coverage", 0.523, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
-    Term("too few points", 0.686, 2.56, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
-    Term("height", 1.296, 1.31, lambda m: _log(m["height_radii"], 0.1, 4.0)),
+    Term("coverage", 3.142, 0.96, lambda m: min(m["coverage"], math.pi) / math.pi),
+    Term("too few points", 0.250, 2.54, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
+    Term("height", 4.191, -0.02, _stubbiness),
     # what the candidates say
-    Term("payoff", 3.193, 0.75, lambda m: m["payoff"]),
-    Term("agreement", 8.954, 0.88, lambda m: m["agreement"]),
-    Term("yield", 3.0, 0.75, lambda m: m["yield"]),
+    Term("payoff", 3.645, 0.82, lambda m: m["payoff"]),
+    Term("agreement", 5.500, 0.85, lambda m: m["agreement"]),
     # cones; and whatever is too short to be told from a sphere
-    Term("slope", -21.66, 0.0, _slope),
-    Term("bulge unknown", -26.708, 0.0, lambda m: min(m["bulge_error"], 1.0)),
+    Term("slope", -36.479, 0.00, _slope),
+    Term("bulge unknown", -26.062, 0.00, lambda m: min(m["bulge_error"], 1.0)),
 )
 
 
@@ -103,7 +110,7 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     --------
     >>> pipe = dict(noise_ratio=1.0, structure=0.0, structure_radii=0.0, inside=0.0, outside=0.0, tangent=0.0,
     ...             coverage=6.0, inliers=2000.0, height_radii=9.0, payoff=0.8, agreement=0.95, slope=0.0,
-    ...             **{"yield": 0.8}, slope_error=0.001, bulge_error=0.01)
+    ...             slope_error=0.001, bulge_error=0.01)
     >>> weigh(pipe)[0] > 0.99
     True
     >>> confidence, worst = weigh({**pipe, "agreement": 0.1, "payoff": 0.3})

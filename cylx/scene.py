@@ -209,8 +209,8 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
     unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # of a cloud wider than 2^21 voxels they are coarser
     codes = morton_codes(np.clip(ordered, 0.0, side), unit)
     again = np.argsort(codes, kind="stable")
-    scale = noise / measured
-    cell, cells, factors = noise_by_place(ordered[patches.middles], patches.deviations / measured, side)
+    places, ratios = ordered[patches.middles], patches.deviations / measured
+    cell, cells, factors = noise_by_place(places, ratios, side)
     keys = cell_keys(cells)
     by_key = np.argsort(keys)
     frame = Frame(
@@ -220,7 +220,14 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
         unit=unit,
         voxel_level=level,
         window=window,
-        noise=Noise(sizes / spacing, deviations * scale / spacing, cell, keys[by_key], factors[by_key]),
+        noise=Noise(
+            sizes / spacing,
+            deviations * (noise / measured) / spacing,
+            cell,
+            keys[by_key],
+            factors[by_key],
+            np.column_stack([places, patches.radii / spacing, ratios]),
+        ),
         origin=corner,
         spacing=spacing,
     )

@@ -9,8 +9,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io", "noise",
-    "payoff", "pipeline", "records", "rejections", "results", "scene", "stages", "synthetic",
+    "api", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io",
+    "measures", "noise", "payoff", "pipeline", "records", "rejections", "results", "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},
@@ -18,8 +18,9 @@ MAY_IMPORT = {
     "cli": EVERYTHING,
     "api": {"config", "errors", "io", "pipeline", "records"},
     "consensus": {"records"},
-    "pipeline": {"config", "consensus", "errors", "game", "geometry", "records", "scene", "stages"},
-    "stages": {"config", "consensus", "errors", "evidence", "game", "geometry", "payoff", "records"},
+    "measures": {"geometry", "records"},
+    "pipeline": {"config", "consensus", "errors", "game", "geometry", "measures", "records", "scene", "stages"},
+    "stages": {"config", "consensus", "errors", "evidence", "game", "geometry", "measures", "payoff", "records"},
     "noise": {"geometry"},
     "payoff": {"game", "geometry"},
     "scene": {"config", "errors", "geometry", "noise", "records"},

@@ -12,10 +12,10 @@ from docs_tables import PACKAGE, TABLES, commands, config_keys, config_sections,
 from cylx import errors, evidence
 from cylx.config import Config
 from cylx.io import annotated
-from cylx.pipeline import turns
+from cylx.pipeline import sources, turns
 from cylx.records import Scene
 from cylx.scene import resolve
-from cylx.stages import averaging, verification
+from cylx.stages import averaging, clustering, curvature, local_slices, verification
 
 ROOT = PACKAGE.parent
 DOCS = ROOT / "docs"
@@ -174,7 +174,24 @@ def test_every_measure_of_the_evidence_is_told_of():
     for golden in (ROOT / "sample_data" / "golden").glob("*.json"):
         for cylinder in json.loads(golden.read_text(encoding="utf-8"))["cylinders"]:
             assert set(cylinder.get("evidence", ())) <= set(told)
-    assert [key for key in told if f'"{key}":' not in inspect.getsource(verification)] == []
+    measured = re.search(r"measures = \{\n(.*?)\n    \}", inspect.getsource(verification.verify), re.DOTALL)[1]
+    assert told == re.findall(r'^        "(\w+)": ', measured, re.MULTILINE)
+
+
+def test_every_stage_is_told_of_with_its_reasons():
+    page = read("docs/json-format.md")
+    rejected = part(page, "## The rejected")
+    rows = rows_of(part(page, "## The stages"))[1:]
+    told = {row[0].strip("`"): row[3] + (rejected if "](#the-rejected)" in row[3] else "") for row in rows}
+    source = "".join(inspect.getsource(module) for module in (sources, turns, curvature, clustering))
+    assert set(told) == set(re.findall(r'(?:\.report|StageReport)\("([a-z ]+)"', source))
+    reasons = {("curvature", reason) for reason in curvature.OUTCOMES[:-1]}
+    reasons |= {("local slicing", reason) for reason in local_slices.COUNTS[1:]}
+    reasons |= {("verification", turns.FOUND_BEFORE)}
+    for golden in (ROOT / "sample_data" / "golden").glob("*.json"):
+        for stage in json.loads(golden.read_text(encoding="utf-8"))["stages"]:
+            reasons |= {(stage["name"], reason) for reason in stage["rejected"]}
+    assert [(stage, reason) for stage, reason in sorted(reasons) if f"`{reason}`" not in told[stage]] == []
 
 
 def test_every_reason_of_a_rejection_is_told_of():

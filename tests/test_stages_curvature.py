@@ -22,7 +22,7 @@ def frame_of(make, **params):
 
 
 def look(frame, radii=ALL_RADII, threads=1, **changes):
-    found, explained, _, report = find_curved_windows(frame, radii, CandidatesConfig(**changes), threads)
+    found, explained, report = find_curved_windows(frame, radii, CandidatesConfig(**changes), threads)
     return found, explained.flatness, report
 
 

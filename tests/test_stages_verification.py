@@ -6,9 +6,10 @@ import pytest
 from cylx.config import Config, VerificationConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
+from cylx.measures import covered_angle, look_at
 from cylx.records import Ground, Noise, Segment
 from cylx.scene import make_frame
-from cylx.stages.verification import covered_angle, look_at, verify
+from cylx.stages.verification import verify
 from cylx.synthetic.surfaces import Frustum, Mantle, Sphere
 
 SIGMA = 0.01
@@ -36,7 +37,7 @@ def pipe(arc_deg=360.0, height=4.0, n=3000):
 
 def judge(points, agreement=(40, 42), payoff=0.8, config=None, **place):
     ground, segment = world(points, **place)
-    return verify(segment, ground, payoff, (*agreement, *agreement), config or VerificationConfig())
+    return verify(segment, ground, payoff, agreement, config or VerificationConfig())
 
 
 def test_a_cylinder_passes_and_shows_nothing_else():
@@ -58,7 +59,7 @@ def test_a_cylinder_passes_and_shows_nothing_else():
 
 def test_errors_are_those_of_the_bound():
     ground, segment = world(pipe())
-    verdict = verify(segment, ground, 0.8, (40, 42, 40, 42), VerificationConfig())
+    verdict = verify(segment, ground, 0.8, (40, 42), VerificationConfig())
     # over a full turn: 2 sigma / sqrt(n) of the place, 2 sigma sqrt(3) / (h / 2) / sqrt(n) of the angle
     noise, n = SIGMA * segment.model[6], len(verdict.points)
     assert np.isclose(verdict.offset_error, 2 * noise / np.sqrt(n), rtol=0.1)
@@ -68,7 +69,7 @@ def test_errors_are_those_of_the_bound():
 def test_nothing_and_a_few_points_are_no_cylinder():
     far = pipe() + 50.0 * np.eye(3)[0]
     ground, segment = world(np.concatenate([far, pipe(n=15)]))
-    verdict = verify(segment, ground, 0.8, (0, 0, 0, 0), VerificationConfig())
+    verdict = verify(segment, ground, 0.8, (0, 0), VerificationConfig())
     assert (verdict.reason, verdict.confidence) == ("too few points", 0.0)
     assert len(verdict.points) <= 15
 

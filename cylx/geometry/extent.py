@@ -71,6 +71,15 @@ def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[Floa
     return heights[:n], angles[:n]
 
 
+def coordinates_of(
+    points: FloatArray, indices: IndexArray, model: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Give heights, signed distances to a cylinder's surface, and angles of some of the points, shape (n,) each."""
+    heights, residuals, angles = np.empty(len(indices)), np.empty(len(indices)), np.empty(len(indices))
+    fill_coordinates(points[indices], model, math.inf, heights, residuals, angles)
+    return heights, residuals, angles
+
+
 @njit(cache=True, nogil=True)
 def fill_coordinates(
     points: FloatArray, model: FloatArray, width: float, heights: FloatArray, residuals: FloatArray, angles: FloatArray

@@ -13,6 +13,9 @@ from cylx.geometry.vectors import cross
 
 FloatArray = NDArray[np.float64]
 
+LEAST = 8
+"""Points that a line is fitted to."""
+
 PARALLEL = 1e-8
 """Below this angle, in radians, rounding of the directions costs more than taking the lines for parallel."""
 
@@ -98,52 +101,54 @@ def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> NDAr
 
 
 @njit(cache=True, nogil=True)
-def fit_line(points: FloatArray, n: int, direction: FloatArray) -> float:
-    """Fit a line to points[:n] by principal components, trimmed twice; fill `direction` (3,).
+def fit_line(points: FloatArray, n: int, reach: float, place: FloatArray, direction: FloatArray) -> tuple[float, float]:
+    """Fit a line to those of points[:n] within `reach` of zero, trimmed twice; fill `place` and `direction` (3,).
 
     Returns
     -------
-    float
-        Root mean square distance from the line, over that along it.
+    across, along : float
+        Root mean square distances from the line, and from its middle along it; infinite and 1 if it has too few points.
     """
-    matrix, vectors, mean = np.empty((3, 3)), np.empty((3, 3)), np.zeros(3)
-    width, ratio = math.inf, 1.0
+    matrix, vectors, total = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    chosen = np.empty(n, np.bool_)
     direction[0], direction[1], direction[2] = 1.0, 0.0, 0.0
+    width, across, along = math.inf, math.inf, 1.0
     for _ in range(3):
-        total, count = np.zeros(3), 0
+        total[0], total[1], total[2], count = 0.0, 0.0, 0.0, 0
         for i in range(n):
-            if _off_line(points, i, mean, direction) < width:
+            square = points[i, 0] ** 2 + points[i, 1] ** 2 + points[i, 2] ** 2
+            chosen[i] = square < reach * reach and off_line(points, i, place, direction) < width
+            if chosen[i]:
                 count += 1
                 for d in range(3):
                     total[d] += points[i, d]
-        if count < 5:
-            return 1.0
-        inside = width
-        last = mean.copy()
+        if count < LEAST:
+            return math.inf, 1.0
         for d in range(3):
-            mean[d] = total[d] / count
+            place[d] = total[d] / count
             for e in range(3):
                 matrix[d, e] = 0.0
         for i in range(n):
-            if _off_line(points, i, last, direction) < inside:
+            if chosen[i]:
                 for d in range(3):
                     for e in range(3):
-                        matrix[d, e] += (points[i, d] - mean[d]) * (points[i, e] - mean[e]) / count
+                        matrix[d, e] += (points[i, d] - place[d]) * (points[i, e] - place[e]) / count
         symmetric_eigen(matrix, vectors)
         longest = 0
         for d in range(1, 3):
             if matrix[d, d] > matrix[longest, longest]:
                 longest = d
-        across = matrix[0, 0] + matrix[1, 1] + matrix[2, 2] - matrix[longest, longest]
+        along = math.sqrt(max(matrix[longest, longest], 1e-300))
+        across = math.sqrt(max(matrix[0, 0] + matrix[1, 1] + matrix[2, 2] - matrix[longest, longest], 0.0))
         for d in range(3):
             direction[d] = vectors[d, longest]
-        width = 2.5 * math.sqrt(max(across, 0.0))
-        ratio = math.sqrt(max(across, 0.0) / max(matrix[longest, longest], 1e-300))
-    return ratio
+        width = 2.5 * across
+    return across, along
 
 
 @njit(cache=True, nogil=True)
-def _off_line(points: FloatArray, i: int, mean: FloatArray, direction: FloatArray) -> float:
+def off_line(points: FloatArray, i: int, mean: FloatArray, direction: FloatArray) -> float:
+    """Give the distance of point i from a line."""
     dx, dy, dz = points[i, 0] - mean[0], points[i, 1] - mean[1], points[i, 2] - mean[2]
     along = dx * direction[0] + dy * direction[1] + dz * direction[2]
     return math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - along * along))

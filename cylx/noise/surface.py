@@ -35,10 +35,12 @@ class Patches(NamedTuple):
         Index of the point each was taken about.
     deviations : ndarray of shape (m,)
         Standard deviations about their quadrics.
+    radii : ndarray of shape (m,)
     """
 
     middles: IndexArray
     deviations: FloatArray
+    radii: FloatArray
 
 
 def measure_surface(
@@ -70,7 +72,7 @@ def measure_surface(
     spread = np.full(len(sample), np.nan)
     deviation = np.full(len(sample), np.nan)
     spacing = np.full(len(sample), np.nan)
-    flat = np.zeros(len(sample), np.bool_)
+    flat, size_of = np.zeros(len(sample), np.bool_), np.zeros(len(sample))
     for count in NEIGHBOURS:
         todo = np.flatnonzero(np.isnan(spread))
         size = min(count, len(points) - 1)
@@ -83,6 +85,7 @@ def measure_surface(
         wide = width > WIDE * sd
         spread[todo[wide]] = sd[wide]
         flat[todo[wide]] = width[wide] > FLAT * sd[wide]
+        size_of[todo[wide]] = radius[wide]
         third = np.flatnonzero(wide)[::3] if wide.any() else np.arange(0, len(todo), 3)
         deviation[todo[third]] = core_spread(points[near[third]])
         fresh = np.isnan(spacing[todo])
@@ -90,7 +93,7 @@ def measure_surface(
     known = np.isfinite(spacing) & (spacing > 0)
     if not known.any():  # a handful of points: their extent is all there is to go by
         guess = float(np.linalg.norm(np.ptp(points, axis=0))) / math.sqrt(len(points))
-        return guess, guess, 0.1 * guess, Patches(np.empty(0, np.int64), np.empty(0))
+        return guess, guess, 0.1 * guess, Patches(np.empty(0, np.int64), np.empty(0), np.empty(0))
     typical, dense = np.quantile(spacing[known], [0.5, 0.1])
     good = np.isfinite(spread) & (spread > 1e-9 * typical)
     clear = good & flat
@@ -100,7 +103,7 @@ def measure_surface(
         plain, robust = half_sample_mode(spread[good]), half_sample_mode(cores + 1e-12 * typical)
         # heavy outliers blow up the plain estimate alone
         noise = max(noise, robust / MAD_SHRINKAGE if robust < 0.85 * MAD_SHRINKAGE * plain else plain)
-    return float(typical), float(dense), float(noise), Patches(sample[clear], spread[clear])
+    return float(typical), float(dense), float(noise), Patches(sample[clear], spread[clear], size_of[clear])
 
 
 @njit(cache=True, nogil=True)

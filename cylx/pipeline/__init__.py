@@ -15,7 +15,7 @@ from cylx.pipeline.sources import (
     ellipses_of_slices,
     windows_and_explained,
 )
-from cylx.pipeline.turns import Turns, Witnesses
+from cylx.pipeline.turns import Turns
 from cylx.pipeline.warmup import kernels_are_cold, practice_cloud
 from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
 from cylx.scene import check_usable, make_frame, radius_range, resolve
@@ -59,7 +59,7 @@ def extract_cylinders(
         config = resolve(config, scene)
         radii = radius_range(config, frame)
     with journal.stage("curvature"):
-        windows, explained, looks = windows_and_explained(frame, radii, config, threads, journal)
+        windows, explained = windows_and_explained(frame, radii, config, threads, journal)
         ground = Ground(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
     with journal.stage("slicing"):
         fits = ellipses_of_slices(frame, explained.flatness, radii, config, threads, journal)
@@ -70,7 +70,7 @@ def extract_cylinders(
     with journal.stage("clustering"):
         players = candidates_along_axis(candidates, config, journal)
         players = thin_candidates(players) if config.clustering.population == "local" else players
-        witnesses = Witnesses(Candidates.joined([windows, local]) if len(windows) else candidates, looks)
+        witnesses = Candidates.joined([windows, local]) if len(windows) else candidates
         game = CandidateGame(players, config.clustering, threads)
         turns = Turns(game, players, witnesses, ground, radii, config, threads)
     with journal.stage("averaging"):

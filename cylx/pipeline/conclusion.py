@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cylx.config import Config
+from cylx.measures import covered_angle
 from cylx.records import (
     CylinderFit,
     Extraction,
@@ -18,7 +19,6 @@ from cylx.records import (
     StageReport,
 )
 from cylx.stages.labelling import label_points, surface_points
-from cylx.stages.verification import covered_angle
 
 
 def conclude(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cylx.config import Config
 from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, EllipseFit, Explained, Frame, Looks
+from cylx.records import Candidates, EllipseFit, Explained, Frame
 from cylx.stages.candidates import polish_candidates, propose_cylinders
 from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
@@ -29,16 +29,16 @@ MARGIN = 5.0
 
 def windows_and_explained(
     frame: Frame, radii: tuple[float, float], config: Config, threads: int, journal: Journal
-) -> tuple[Candidates, Explained, Looks]:
-    """Propose candidates from curved windows, and tell which points lie in flat ones, and what was looked at."""
+) -> tuple[Candidates, Explained]:
+    """Propose candidates from curved windows, and tell which points lie in flat ones."""
     if "curvature" in config.candidates.sources:
-        windows, explained, looks, report = find_curved_windows(frame, radii, config.candidates, threads)
+        windows, explained, report = find_curved_windows(frame, radii, config.candidates, threads)
         journal.reports.append(report)
-        return windows, explained, looks
+        return windows, explained
     explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
     if config.slicing.local_planes:  # slices, too, pass over what is flat
         explained.flatness[:] = find_curved_windows(frame, radii, config.candidates, threads)[1].flatness
-    return Candidates.joined([]), explained, Looks.joined([])
+    return Candidates.joined([]), explained
 
 
 def ellipses_of_slices(

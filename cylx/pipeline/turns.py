@@ -8,15 +8,20 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cylx.config import Config
-from cylx.consensus import Neighbourhood, Yield, is_contradicted
+from cylx.consensus import Neighbourhood, is_contradicted
 from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
-from cylx.records import Candidates, Cluster, Finding, Ground, Looks, Refusal, Segment
+from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
-from cylx.stages.merging import drop_claimed, is_part_of, merge_pieces
+from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
+
+FloatArray = NDArray[np.float64]
 
 FOUND_BEFORE = "found before"
 """The reason of a segment that is one of those accepted already; it is no other cylinder."""
@@ -24,26 +29,6 @@ FOUND_BEFORE = "found before"
 
 ROUND = 16
 """Clusters fitted at the same time; the number does not depend on that of the threads, and so the result does not."""
-
-
-WIDE = 0.1
-"""Windows within this many radii of a surface, at least, are on it."""
-
-
-class Witnesses:
-    """Who may speak for and against a cylinder.
-
-    Parameters
-    ----------
-    candidates : Candidates
-        Drawn evenly over the surface.
-    looks : Looks
-        All windows, fruitful or not.
-    """
-
-    def __init__(self, candidates: Candidates, looks: Looks) -> None:
-        self.near = Neighbourhood(candidates)
-        self.looks = Yield(looks)
 
 
 class Turns:
@@ -54,7 +39,7 @@ class Turns:
     game : CandidateGame
     players : Candidates
         Those in the game.
-    witnesses : Witnesses
+    witnesses : Candidates
         What a cylinder should agree with: all curved windows, which are drawn evenly over the surface.
     ground : Ground
         The cloud.
@@ -75,7 +60,7 @@ class Turns:
         self,
         game: CandidateGame,
         players: Candidates,
-        witnesses: Witnesses,
+        witnesses: Candidates,
         ground: Ground,
         radii: tuple[float, float],
         config: Config,
@@ -83,7 +68,7 @@ class Turns:
     ) -> None:
         self._game = game
         self._players = players
-        self._witnesses = witnesses
+        self._witnesses = Neighbourhood(witnesses)
         self._ground = ground
         self._radii = radii
         self._config = config
@@ -98,7 +83,7 @@ class Turns:
         rejected: Counter[str] = Counter()
         with ThreadPoolExecutor(self._threads) as pool:
             while clusters := self._next_clusters():
-                known = tuple(finding.segment for finding in findings)
+                known = as_rows([finding.segment for finding in findings])
                 for outcome in list(pool.map(self._try, clusters, repeat(known))):
                     found = self._new_or_known(outcome, findings)
                     if isinstance(found, Finding):
@@ -130,16 +115,16 @@ class Turns:
                 self._game.withdraw(self._game.explained_by(average, closely=True))
         return clusters
 
-    def _try(self, candidate: tuple[Cluster, Segment], known: tuple[Segment, ...]) -> Finding | Refusal:
+    def _try(self, candidate: tuple[Cluster, Segment], known: FloatArray) -> Finding | Refusal:
         """Fit an average and judge it: the finding, or why it is none."""
         cluster, average = candidate
         support, payoff = len(cluster.members), cluster.payoff
-        if self._config.verification.enabled and is_contradicted(self._witnesses.near.agreement(average)):
+        if self._config.verification.enabled and is_contradicted(self._witnesses.agreement(average)):
             return Refusal(average, "agreement", support, payoff)
         fitted = self._fit(average)
         if isinstance(fitted, str):
             return Refusal(average, fitted, support, payoff)
-        if self._removes and any(is_part_of(fitted, segment) for segment in known):
+        if self._removes and is_part_of(fitted, known):
             return Refusal(fitted, FOUND_BEFORE, support, payoff)
         return self._judge(fitted, support, payoff)
 
@@ -147,8 +132,8 @@ class Turns:
         """Refuse a finding that another cluster of the same round has led to before."""
         if not (self._removes and isinstance(found, Finding)):
             return found
-        known = any(is_part_of(found.segment, finding.segment) for finding in findings)
-        return Refusal.of(found, FOUND_BEFORE) if known else found
+        known = as_rows([finding.segment for finding in findings[-ROUND:]])
+        return Refusal.of(found, FOUND_BEFORE) if is_part_of(found.segment, known) else found
 
     def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
@@ -201,8 +186,7 @@ class Turns:
         """Verify a segment; what speaks most against it if it does not pass."""
         if reason := self._out_of_range(segment):
             return Refusal(segment, reason, support, payoff)
-        width = max(3.0 * self._ground.noise_about(segment.model, segment.half), WIDE * float(segment.model[6]))
-        counts = (*self._witnesses.near.agreement(segment), *self._witnesses.looks.of(segment, width))
+        counts = self._witnesses.agreement(segment)
         verdict = verify(segment, self._ground, payoff, counts, self._config.verification)
         reason, limits = verdict.reason, self._config.verification
         if verdict.measures and not limits.enabled:

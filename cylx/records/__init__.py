@@ -6,7 +6,7 @@ one. All records are frozen: a stage makes new ones and never changes those it w
 
 from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source, cell_keys
 from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
-from cylx.records.octaves import Explained, Looks, Octave
+from cylx.records.octaves import Explained, Octave
 from cylx.records.outcomes import CylinderFit, Extraction, Finding, Refusal, Rejection, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
 
@@ -20,7 +20,6 @@ __all__ = [
     "Finding",
     "Frame",
     "Ground",
-    "Looks",
     "Noise",
     "Observer",
     "Octave",

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cylx.geometry.cells import Cells
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -132,6 +132,13 @@ class Scene:
     extent: float
 
 
+SMALL_PATCH = 2.0
+"""Patches of a cylinder's surface have at most its radius over this."""
+ENOUGH_PATCHES = 5
+MOST_NOISE = 4.0
+"""No surface is taken for this many times noisier than usual: it would be none."""
+
+
 def cell_keys(cells: IndexArray) -> IndexArray:
     """Give one number for each cell (n, 3), shape (n,)."""
     low = cells & 0x1FFFFF
@@ -157,6 +164,8 @@ class Noise:
         Keys of the cells where it was, ascending; none if it is the same everywhere.
     factors : ndarray of shape (C,)
         How many times the usual it is there.
+    patches : ndarray of shape (m, 5)
+        Small pieces of surface: place (3), radius, and the noise about it as a multiple of the usual.
     """
 
     sizes: FloatArray
@@ -164,6 +173,7 @@ class Noise:
     side: float = 1.0
     cells: IndexArray = field(default_factory=lambda: np.empty(0, np.int64))
     factors: FloatArray = field(default_factory=lambda: np.empty(0))
+    patches: FloatArray = field(default_factory=lambda: np.empty((0, 5)))
 
     def at(self, size: float) -> float:
         """Give the usual standard deviation over a piece of this radius; ends of the table hold beyond them."""
@@ -260,18 +270,22 @@ class Ground:
         return self.cells.points
 
     def noise_about(self, model: FloatArray, half: float = 0.0) -> float:
-        """Give the noise over the surface of a cylinder (7,), a piece as large as its diameter, along its height."""
+        """Give the noise over the surface of a cylinder (7,), a piece as large as its diameter.
+
+        Its own patches of surface say whether it is noisier than usual: a camera sees steep sides less exactly than the
+        floor. Patches that are not small against the cylinder show its curvature rather than noise.
+        """
         radius = float(model[6])
         usual = self.noise.at(2.0 * radius)
-        if len(self.noise.cells) == 0:
-            return usual
-        frame = np.stack(axis_frame(model[3:6]))
-        turns = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
-        around = radius * np.column_stack([np.cos(turns), np.sin(turns)]) @ frame
-        along = np.linspace(-half, half, 9)[:, None] * model[3:6] + model[:3]
-        factors = self.noise.factors_at((along[:, None] + around).reshape(-1, 3), math.nan)
-        known = factors[np.isfinite(factors)]
-        return usual * float(np.median(known)) if len(known) else usual
+        patches = self.noise.patches[self.noise.patches[:, 3] < radius / SMALL_PATCH]
+        offsets = patches[:, :3] - model[:3]
+        heights = offsets @ model[3:6]
+        distances = np.sqrt(np.maximum((offsets * offsets).sum(axis=1) - heights * heights, 0.0))
+        on = (np.abs(heights) < half) & (np.abs(distances - radius) < np.maximum(0.1 * radius, 4.0 * usual))
+        if on.sum() < ENOUGH_PATCHES:
+            return usual * max(1.0, float(self.noise.factors_at(model[None, :3])[0]))
+        own = float(np.median(patches[on, 4]))
+        return usual * min(own, MOST_NOISE) if own > 1.2 else usual
 
     def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
         """Tell which points may lie on a cylinder: those in flat windows of two radii belong to something flatter."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,33 +93,3 @@ class Explained:
 
     flatness: FloatArray
     curved: MaskArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Looks:
-    """All windows that held points enough, whatever came of them.
-
-    Parameters
-    ----------
-    places : ndarray of shape (n, 3)
-        Points of the cloud they were laid about.
-    windows : ndarray of shape (n,)
-        Their radii.
-    models : ndarray of shape (n, 7)
-        The candidate each gave; its radius is 0 where there is none.
-    """
-
-    places: FloatArray
-    windows: FloatArray
-    models: FloatArray
-
-    @classmethod
-    def joined(cls, parts: Sequence[Looks]) -> Looks:
-        """Put several sets behind one another."""
-        if not parts:
-            return cls(np.empty((0, 3)), np.empty(0), np.empty((0, 7)))
-        return cls(
-            np.concatenate([part.places for part in parts]),
-            np.concatenate([part.windows for part in parts]),
-            np.concatenate([part.models for part in parts]),
-        )

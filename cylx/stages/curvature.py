@@ -19,7 +19,7 @@ from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
 from cylx.geometry.small_matrices import fill_frame
-from cylx.records import Candidates, Explained, Frame, Looks, Octave, StageReport
+from cylx.records import Candidates, Explained, Frame, Octave, StageReport
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -27,6 +27,8 @@ MaskArray = NDArray[np.bool_]
 
 CAPACITY = 2048
 """Most points of a window; thinned windows over one surface hold about 600."""
+ENOUGH = 250
+"""Points of a window that suffice; it uses fewer than twice as many."""
 FEW_SEEDS = 3000
 """Octaves with fewer windows than this get them more closely."""
 FLAT_SHARE = 0.9
@@ -39,7 +41,7 @@ COLUMNS = 9
 
 def find_curved_windows(
     frame: Frame, radius_range: tuple[float, float], config: CandidatesConfig, threads: int
-) -> tuple[Candidates, Explained, Looks, StageReport]:
+) -> tuple[Candidates, Explained, StageReport]:
     """Propose a cylinder for each window whose points are curved one way.
 
     Parameters
@@ -56,13 +58,10 @@ def find_curved_windows(
     candidates : Candidates
     explained : Explained
         Which points lie in flat windows, and which on candidates.
-    looks : Looks
-        All windows with points enough.
     report : StageReport
     """
     explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
     parts: list[Candidates] = []
-    looks: list[Looks] = []
     counts = np.zeros(len(OUTCOMES), np.int64)
     for radius in reversed(frame.window_radii(config.octave)):
         octave = Octave.of(frame, radius, explained.flatness == 0)
@@ -75,8 +74,6 @@ def find_curved_windows(
         flat = outcome == 1
         if flat.any():
             _mark_flat(frame, octave, seeds[flat], planes[flat], explained.flatness)
-        models = np.where((outcome == 5)[:, None], rows[:, :7], 0.0)[outcome > 0]
-        looks.append(Looks(octave.points[seeds[outcome > 0]], np.full(len(models), radius), models))
         good = rows[outcome == 5]
         parts.append(
             Candidates(
@@ -89,7 +86,7 @@ def find_curved_windows(
         )
     found = Candidates.joined(parts)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:5], counts[:5], strict=True) if n}
-    return found, explained, Looks.joined(looks), StageReport("curvature", int(counts.sum()), len(found), rejected)
+    return found, explained, StageReport("curvature", int(counts.sum()), len(found), rejected)
 
 
 def _look(
@@ -159,7 +156,7 @@ def _scan(
     quality = np.empty(5)
     for s in range(len(seeds)):
         seed, model, noise = points[seeds[s]], rows[s, :7], noises[s]
-        n = gather_ball(points, cells, starts, side, seed, 2.0 * radius, found)
+        n = _thinned(found, gather_ball(points, cells, starts, side, seed, 2.0 * radius, found))
         m = _center_window(points, found, n, seed, radius, around, inner)
         if m < 12 or n < 20:
             outcome[s] = 0
@@ -184,6 +181,19 @@ def _scan(
         _mark_explained(around, found, n, model, 3.0 * noise, axes, marks)
         move_to_foot(model, seed)
         rows[s, 7], rows[s, 8] = quality[0], quality[1]
+
+
+@njit(cache=True, nogil=True)
+def _thinned(found: IndexArray, n: int) -> int:
+    """Keep every so manyth of the indices where there are many more than a fit needs; count them."""
+    stride = n // ENOUGH
+    if stride < 2:
+        return n
+    m = 0
+    for a in range(0, n, stride):
+        found[m] = found[a]
+        m += 1
+    return m
 
 
 @njit(cache=True, nogil=True)

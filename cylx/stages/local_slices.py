@@ -18,7 +18,7 @@ from cylx.config import SlicingConfig
 from cylx.geometry.circle import search_circle
 from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.ellipse import conic_shape, search_conic
-from cylx.geometry.lines import fit_line
+from cylx.geometry.lines import fit_line, off_line
 from cylx.geometry.morton import gather_ball
 from cylx.geometry.small_matrices import fill_frame
 from cylx.records import Candidates, Explained, Frame, Octave
@@ -32,7 +32,7 @@ SAMPLES = 48
 """Samples of five points a slice."""
 THICKNESS = 0.15
 """Half thickness of a slice in radii of its window."""
-SLIM = 0.25
+SLIM = 0.4
 """A window's points are elongated if they scatter less than this share of their length about their line."""
 FEWEST = 15
 """Points without which nothing is tried in a window."""
@@ -166,7 +166,7 @@ def _slice_windows(
     rows: FloatArray,
     counts: IndexArray,
 ) -> None:
-    found, around = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3))
+    found, around, alone = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
     flat, samples = np.empty((CAPACITY, 2)), np.empty((SAMPLES, 5), np.int64)
     model, normal, frame = np.empty(7), np.empty(3), np.empty((2, 3))
     shape, quality = np.empty(5), np.empty(5)
@@ -185,15 +185,16 @@ def _slice_windows(
         for p in range(planes + 1):
             counts[0] += 1
             # the first one across the longest direction, as thick as the window; then in all directions
-            thick, offset = THICKNESS * reach, 0.0
+            thick, offset, size = THICKNESS * reach, 0.0, n
             if p == 0:
-                thick = math.inf if fit_line(around, n, normal) < SLIM else 0.0
+                thick, size = math.inf, _pick_slim(around, n, reach, normal, alone)
             else:
                 state = _draw(_fill_normal(state, normal))
                 k = (state >> 20) % n
                 offset = around[k, 0] * normal[0] + around[k, 1] * normal[1] + around[k, 2] * normal[2]
             fill_frame(normal, frame)
-            m = _project(around, n, normal, offset, thick, frame, flat)
+            own = alone if p == 0 else around
+            m = _project(own, size, normal, offset, thick, frame, flat)
             if m < FEWEST:
                 counts[1] += 1
                 continue
@@ -205,13 +206,35 @@ def _slice_windows(
             for turn in range(1 if p == 0 else 2):
                 _set_model(normal, offset, frame, shape, 1.0 if turn == 0 else -1.0, model)
                 low, high = max(radius_range[0], 0.5 * model[6]), min(radius_range[1], 2.0 * model[6])
-                fit = polish(around, n, model, noise, low, high, supported[0], supported[1], 0.5 * low, quality)
+                fit = polish(own, size, model, noise, low, high, supported[0], supported[1], 0.5 * low, quality)
                 fits = fits or fit == 2
                 if fit == 2 and quality[0] > rows[s, 7]:
                     move_to_foot(model, seed)
                     rows[s, :7] = model
                     rows[s, 7], rows[s, 8] = quality[0], quality[1]
             counts[3] += 0 if fits else 1
+
+
+@njit(cache=True, nogil=True)
+def _pick_slim(points: FloatArray, n: int, reach: float, direction: FloatArray, out: FloatArray) -> int:
+    """Fill in the points along the longest direction of what is about zero, if that is slim; count them.
+
+    Of several pipes side by side a smaller part of the window shows the one it was laid about.
+    """
+    place = np.zeros(3)
+    for part in (1.0, 0.6, 0.36):
+        for d in range(3):
+            place[d] = 0.0
+        across, along = fit_line(points, n, part * reach, place, direction)
+        if across < SLIM * along:
+            m = 0
+            for i in range(n):
+                if off_line(points, i, place, direction) < 3.0 * across:
+                    for d in range(3):
+                        out[m, d] = points[i, d]
+                    m += 1
+            return m
+    return 0
 
 
 @njit(cache=True, nogil=True)

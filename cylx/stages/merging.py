@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,29 +46,54 @@ def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[
     pool = sorted(findings, key=lambda finding: -len(finding.points))
     i = 0
     while i < len(pool):
-        j = i + 1
-        while j < len(pool):
-            joined = _join(pool[i], pool[j], ground, judge)
-            if joined is None:
-                j += 1
-            else:
-                pool[i] = joined
-                del pool[j]
-                j = i + 1
-        i += 1
+        joined = _first_join(pool, i, ground, judge)
+        if joined is None:
+            i += 1
+        else:
+            j, pool[i] = joined
+            del pool[j]
     return pool
 
 
-def is_part_of(segment: Segment, whole: Segment) -> bool:
-    """Tell whether a segment lies on one that is known: axis within a sixth of the radius, radius within a tenth."""
-    if abs(segment.model[3:6] @ whole.model[3:6]) < SAME_COSINE:
-        return False
-    if abs(segment.model[6] / whole.model[6] - 1.0) > 0.1:
-        return False
-    across = segment.model[:3] - whole.model[:3]
-    height = float(across @ whole.model[3:6])
-    apart = float(np.linalg.norm(across - height * whole.model[3:6]))
-    return bool(apart < 0.15 * whole.model[6] and abs(height) + 0.5 * segment.half < whole.half + 0.5 * whole.model[6])
+def _first_join(pool: list[Finding], i: int, ground: Ground, judge: Judge) -> tuple[int, Finding] | None:
+    """Give the first after i that can be joined with it, and what they are together."""
+    rest = pool[i + 1 :]
+    if not rest:
+        return None
+    one = pool[i].segment.model
+    others = np.array([finding.segment.model for finding in rest])
+    ratios = others[:, 6] / one[6]
+    alike = np.abs(others[:, 3:6] @ one[3:6]) >= COSINE
+    alike &= (ratios >= RADIUS_RATIO) & (ratios * RADIUS_RATIO <= 1.0)
+    for k in np.flatnonzero(alike):
+        joined = _join(pool[i], rest[k], ground, judge)
+        if joined is not None:
+            return i + 1 + int(k), joined
+    return None
+
+
+def as_rows(segments: Sequence[Segment]) -> FloatArray:
+    """Give segments as rows (n, 8): model and half height."""
+    return np.array([[*segment.model, segment.half] for segment in segments]).reshape(len(segments), 8)
+
+
+def is_part_of(segment: Segment, known: FloatArray) -> bool:
+    """Tell whether a segment lies on one that is known: axis within a sixth of the radius, radius within a tenth.
+
+    Parameters
+    ----------
+    segment : Segment
+    known : ndarray of shape (n, 8)
+        From `as_rows`.
+    """
+    model, radii = segment.model, known[:, 6]
+    alike = (np.abs(known[:, 3:6] @ model[3:6]) >= SAME_COSINE) & (np.abs(model[6] / radii - 1.0) <= 0.1)
+    known = known[alike]
+    across = model[:3] - known[:, :3]
+    heights = (across * known[:, 3:6]).sum(axis=1)
+    apart = np.linalg.norm(across - heights[:, None] * known[:, 3:6], axis=1)
+    along = np.abs(heights) + 0.5 * segment.half < known[:, 7] + 0.5 * known[:, 6]
+    return bool(((apart < 0.15 * known[:, 6]) & along).any())
 
 
 def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
@@ -90,13 +115,8 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
 
 
 def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
-    """Fit one cylinder to two pieces; None if it does not explain both."""
+    """Fit one cylinder to two pieces alike in direction and radius; None if it does not explain both."""
     one, two = a.segment, b.segment
-    noise = ground.noise_about(one.model, one.half)
-    if abs(one.model[3:6] @ two.model[3:6]) < COSINE:
-        return None
-    if min(one.model[6], two.model[6]) < RADIUS_RATIO * max(one.model[6], two.model[6]):
-        return None
     across = two.model[:3] - one.model[:3]
     height = float(across @ one.model[3:6])
     apart = float(np.linalg.norm(across - height * one.model[3:6]))
@@ -110,6 +130,7 @@ def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | Non
     model = one.model.copy()
     model[:3] += 0.5 * (low + high) * model[3:6]
     half = 0.5 * (high - low)
+    noise = ground.noise_about(one.model, one.half)
     kernel = Kernel(max(0.1 * model[6], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
     pieces = [ground.points[finding.points[:: 1 + len(finding.points) // ENOUGH]] for finding in (a, b)]
     fit = fit_cylinder(np.concatenate(pieces), model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=30)

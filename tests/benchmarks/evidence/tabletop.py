@@ -66,14 +66,15 @@ def stand_or_lie(rng, taken, radius, height, lying=0.2):
 def can(rng, sketch, taken):
     """Add a closed can, or a mug: open, with a handle."""
     radius = rng.uniform(0.015, 0.055)
-    height = radius * rng.uniform(1.0, 4.5)
-    is_mug = rng.random() < 0.25
+    height = radius * (rng.uniform(0.6, 1.2) if rng.random() < 0.3 else rng.uniform(1.0, 4.5))
+    is_mug = rng.random() < 0.2
     placed = stand_or_lie(rng, taken, radius * (1.8 if is_mug else 1.0), height, lying=0.0 if is_mug else 0.2)
     if placed is None:
         return
     foot, direction = placed
     shape = Cylinder(foot + 0.5 * height * direction, direction, radius, height)
-    sketch.add_cylinder(shape, Mantle(shape, 0.0, 2 * np.pi))
+    real = rng.random() < 0.7
+    sketch.add_cylinder(shape, formed(rng, foot, direction, radius, height) if real else Mantle(shape, 0.0, 2 * np.pi))
     if is_mug:
         first, second = axis_frame(direction)
         angle = rng.uniform(0, 2 * np.pi)
@@ -81,7 +82,26 @@ def can(rng, sketch, taken):
         turn = np.column_stack([-direction, out, np.cross(-direction, out)])
         sketch.add(Elbow(shape.point + radius * out, turn, 0.12 * radius, 0.3 * height, np.pi))
     else:
-        sketch.add(lid(shape, -1), lid(shape, 1))
+        depth = rng.uniform(0.0, 0.12) * radius if real else 0.0  # lids of tins lie below their rims
+        inner = Cylinder(shape.point, shape.direction, radius, height - 2 * depth)
+        sketch.add(lid(inner, -1), lid(inner, 1))
+
+
+def formed(rng, foot, direction, radius, height):
+    """Give the mantle of a real can: rims, ribs, a belly, a neck, a little out of round; about a hundredth in all."""
+    heights = np.linspace(0.0, height, 90)
+    along = heights / height
+    share = rng.uniform(-0.006, 0.006) * (4 * (along - 0.5) ** 2 - 1 / 3)
+    if rng.random() < 0.5:
+        rim = min(rng.uniform(0.002, 0.004), 0.1 * height)
+        share = share + rng.uniform(0.005, 0.035) * ((heights < rim) | (heights > height - rim))
+    if rng.random() < 0.4:
+        ribbed = (along > 0.2) & (along < 0.8)
+        pitch = rng.uniform(0.004, 0.012)
+        share = share + rng.uniform(0.002, 0.012) * np.sin(2 * np.pi * heights / pitch) * ribbed
+    if rng.random() < 0.2:
+        share = share - rng.uniform(0.01, 0.12) * np.clip((along - 0.9) / 0.1, 0, 1)
+    return Lathe(foot, direction, heights, radius * (1 + share), oval=rng.uniform(0, 0.008), open=True)
 
 
 def bottle(rng, sketch, taken):

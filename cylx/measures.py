@@ -1,0 +1,219 @@
+"""What can be measured of a segment against the points in and about it; none of it needs normals."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.geometry.extent import coordinates_of
+from cylx.records import Ground, Segment
+
+FloatArray = NDArray[np.float64]
+MaskArray = NDArray[np.bool_]
+
+PIECES = 10
+"""Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
+TRUNCATED = 0.9866
+"""Standard deviation of a Gaussian cut off at three sigmas."""
+SECTORS = 36
+ARC_SHARE = 0.3
+"""Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shell:
+    """The points about a segment in its own coordinates.
+
+    Parameters
+    ----------
+    indices : ndarray of shape (n,)
+        Which points of the cloud they are.
+    heights, residuals, angles : ndarray of shape (n,)
+        Heights in half heights (so in [-1, 1]), signed distances to the surface, angles about the axis.
+    on : ndarray of shape (n,), bool
+        Points on the surface that may belong to it.
+    flat : ndarray of shape (n,), bool
+        Points of something much flatter than the segment.
+    deviation : float
+        Standard deviation the surface was cut out with.
+    """
+
+    indices: NDArray[np.int64]
+    heights: FloatArray
+    residuals: FloatArray
+    angles: FloatArray
+    on: MaskArray
+    flat: MaskArray
+    deviation: float
+
+    def thinned(self, stride: int) -> Shell:
+        """Give every so manyth point: shares and shapes stay, and cost what they should."""
+        return Shell(
+            self.indices[::stride],
+            self.heights[::stride],
+            self.residuals[::stride],
+            self.angles[::stride],
+            self.on[::stride],
+            self.flat[::stride],
+            self.deviation,
+        )
+
+
+def look_at(segment: Segment, ground: Ground) -> Shell:
+    """Collect the points in and about a segment."""
+    model, half = segment.model, segment.half
+    noise = ground.noise_about(model, half)
+    deviation = max(min(segment.spread, 2.0 * noise), noise)
+    near = ground.cells.near_cylinder(model, -half, half, 0.0, model[6] + max(0.5 * model[6], 10.0 * deviation))
+    heights, residuals, angles = coordinates_of(ground.points, near, model)
+    flat = ~ground.may_be_on(near, model[6])
+    on = (np.abs(residuals) < 3.0 * deviation) & ~flat
+    return Shell(near, heights / max(half, 1e-300), residuals, angles, on, flat, deviation)
+
+
+def covered_angle(angles: FloatArray) -> float:
+    """Give the angle that points cover about an axis, radians.
+
+    A sector counts if it holds at least 15 % of what a typical filled one does. Sectors are finer where
+    there are points enough for it.
+    """
+    if len(angles) == 0:
+        return 0.0
+    fine = int(np.clip(len(angles) // 20, SECTORS, 360))
+    return float(_filled(angles, fine).mean()) * 2.0 * math.pi
+
+
+def _filled(angles: FloatArray, sectors: int, share: float = 0.15) -> MaskArray:
+    index = ((angles / (2.0 * np.pi) + 0.5) * sectors).astype(np.int64) % sectors
+    counts = np.bincount(index, minlength=sectors)
+    return np.asarray(counts > max(0.5, share * float(np.median(counts[counts > 0]))), dtype=np.bool_)
+
+
+def _sector(angles: FloatArray) -> NDArray[np.int64]:
+    return ((angles / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
+
+
+def shape_of(shell: Shell, segment: Segment, deviation: float) -> dict[str, float]:
+    """Measure curvature against a plane, slope and bulge along the axis, and their standard errors."""
+    radius, half = float(segment.model[6]), segment.half
+    gram, right = np.zeros((7, 7)), np.zeros(7)
+    _fill_shape(shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on], gram, right)
+    gram[np.diag_indices(7)] *= 1.0 + 1e-12
+    covariance = np.linalg.pinv(gram[:5, :5], hermitian=True) * deviation**2
+    wider = np.linalg.pinv(gram, hermitian=True)
+    terms = wider @ right
+    errors = np.sqrt(np.maximum(np.diag(wider), 0.0)) * deviation
+    return {
+        "curvature": radius / math.sqrt(max(float(covariance[4, 4]), 1e-300)),
+        "offset_error": math.sqrt(max(float(covariance[0, 0] + covariance[1, 1]), 0.0)),
+        "tilt_error": math.sqrt(max(float(covariance[2, 2] + covariance[3, 3]), 0.0)) / half,
+        "slope": float(terms[5]) / half,
+        "slope_error": float(errors[5]) / half,
+        "bulge": -2.0 * float(terms[6]) * radius / half**2,
+        "bulge_error": 2.0 * float(errors[6]) * radius / half**2,
+    }
+
+
+@njit(cache=True, nogil=True)
+def _fill_shape(z: FloatArray, residuals: FloatArray, angles: FloatArray, gram: FloatArray, right: FloatArray) -> None:
+    """Fill the normal equations of offset (2), tilt (2), radius, slope and bulge."""
+    row, middle = np.empty(7), 0.0
+    for i in range(len(z)):
+        middle += z[i] * z[i] / len(z)
+    for i in range(len(z)):
+        row[0], row[1] = math.cos(angles[i]), math.sin(angles[i])
+        row[2], row[3] = z[i] * row[0], z[i] * row[1]
+        row[4], row[5], row[6] = 1.0, z[i], z[i] * z[i] - middle
+        for a in range(7):
+            right[a] += row[a] * residuals[i]
+            for b in range(a + 1):
+                gram[a, b] += row[a] * row[b]
+    for a in range(7):
+        for b in range(a + 1, 7):
+            gram[a, b] = gram[b, a]
+
+
+def lack_of_fit(shell: Shell, deviation: float) -> tuple[float, float]:
+    """Give chi-square per cell of the mean residuals over the surface, and the rms of what is structure in them."""
+    z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
+    rows = int(np.clip(len(z) / 60, 3, 8))
+    cell = ((angles / (2.0 * np.pi) + 0.5) * 24).astype(np.int64) % 24 * rows
+    cell += np.clip(((z + 1.0) / 2.0 * rows).astype(np.int64), 0, rows - 1)
+    counts = np.bincount(cell, minlength=24 * rows)
+    sums = np.bincount(cell, residuals, minlength=24 * rows)
+    full = counts >= 4
+    if full.sum() <= 6:
+        return 1.0, 0.0
+    squares = float((sums[full] ** 2 / counts[full]).sum())
+    variance = max(deviation**2, 1e-300)  # points may lie on the surface exactly
+    excess = max(0.0, (squares - float(full.sum()) * variance) / float(counts[full].sum()))
+    return squares / variance / max(int(full.sum()) - 5, 1), math.sqrt(excess)
+
+
+def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
+    """Give points inside and just outside as shares of those on the surface, medians over pieces of the height.
+
+    Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
+    """
+    piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES).astype(np.int64), 0, PIECES - 1)
+    outer = max(0.5 * radius, 10.0 * shell.deviation)
+    on = np.abs(shell.residuals) < 3.0 * shell.deviation
+    inside = shell.residuals < -4.0 * shell.deviation
+    outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
+    counts = [np.bincount(piece[mask], minlength=PIECES) for mask in (on, inside, outside)]
+    full = counts[0] >= 1
+    if not full.any():
+        return 1.0, 1.0
+    return (
+        float(np.median(counts[1][full] / counts[0][full])),
+        float(np.median(counts[2][full] / counts[0][full])),
+    )
+
+
+def continuation(shell: Shell, radius: float) -> float:
+    """Give the density of points that go on tangentially past both ends of the arc, as a share of the arc's own.
+
+    A rounded edge of a box goes on as its two sides; a pipe ends.
+    """
+    middle = np.abs(shell.heights) <= 0.8
+    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
+    closed = _filled(shell.angles[on], SECTORS, ARC_SHARE) if on.any() else np.zeros(SECTORS, np.bool_)
+    for _ in range(2):  # gaps of up to two sectors are not ends
+        for step in (1, 2):
+            closed |= np.roll(closed, 1) & np.roll(closed, -step)
+    if closed.all() or not closed.any():
+        return 0.0
+    start, length = _longest_run(closed)
+    if length >= SECTORS - 3:
+        return 0.0
+    width = 2.0 * math.pi / SECTORS
+    counts = np.bincount(_sector(shell.angles[on]), minlength=SECTORS)
+    density = max(float(counts[(start + np.arange(length)) % SECTORS].sum()) / length, 1e-9)
+    low = -math.pi + start * width
+    # sectors that are a little filled count as arc, so that it may have ended up to this much before
+    reach, early = math.radians(20.0), math.radians(25.0)
+    shares = []
+    for end, sign in ((low, -1.0), (low + length * width, 1.0)):
+        past = (sign * (shell.angles - end) + math.pi) % (2.0 * math.pi) - math.pi
+        least = radius * (1.0 / np.cos(np.clip(past, 0.0, reach)) - 1.0) - 4.0 * shell.deviation
+        most = radius * (1.0 / np.cos(np.clip(past, 0.0, reach) + early) - 1.0) + 4.0 * shell.deviation
+        along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
+        shares.append(float(along.sum()) / (reach / width) / density)
+    return min(shares)
+
+
+def _longest_run(filled: MaskArray) -> tuple[int, int]:
+    """Give start and length of the longest cyclic run of True; not all are True."""
+    best = (0, 0)
+    count = len(filled)
+    for start in np.flatnonzero(filled & ~np.roll(filled, 1)):
+        length = 0
+        while length < count and filled[(start + length) % count]:
+            length += 1
+        if length > best[1]:
+            best = (int(start), length)
+    return best
