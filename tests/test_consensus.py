@@ -1,12 +1,12 @@
-"""What candidates and windows say of a cylinder: the quick search by place against a look at all of them."""
+"""What the candidates say of a cylinder: the quick search by place against a look at all of them."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.consensus import SAME, TOO_LARGE, WITNESS, Neighbourhood, Yield, is_contradicted
-from cylx.records import Candidates, Looks, Segment
+from cylx.consensus import SAME, WITNESS, Neighbourhood, is_contradicted
+from cylx.records import Candidates, Segment
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=60, deadline=None)
@@ -82,38 +82,13 @@ def test_those_who_agree_are_all_who_do_and_are_alive(seed, offset, angle_deg, r
     assert np.array_equal(np.sort(found), np.flatnonzero(expected))
 
 
-def looks_about(rng, segment, count=250):
-    """Give windows on a cylinder's surface and off it; some found nothing."""
-    turn = np.linalg.qr(np.column_stack([segment.model[3:6], rng.standard_normal((3, 2))]))[0]
-    angles, off = rng.uniform(0, 2 * np.pi, count), rng.choice([0.02, 0.5], count) * rng.standard_normal(count)
-    out = segment.model[6] * (1 + off)
-    local = np.column_stack([rng.uniform(-1.6, 1.6, count) * segment.half, out * np.cos(angles), out * np.sin(angles)])
-    models = models_about(rng, segment, count)
-    models[rng.random(count) < 0.4, 6] = 0.0
-    return Looks(local @ turn.T + segment.model[:3], segment.model[6] * np.exp(rng.uniform(-2, 2, count)), models)
-
-
-@laws
-@given(seeds, st.floats(0.01, 1.5))
-def test_the_yield_is_that_of_all_windows(seed, width):
-    rng = np.random.default_rng(seed)
-    segment = a_segment(rng)
-    looks, radius = looks_about(rng, segment), segment.model[6]
-    heights, apart = distances(looks.places, segment)
-    telling = (looks.windows > WITNESS * min(radius, 1.2 * segment.half)) & (looks.windows < TOO_LARGE * radius)
-    near = telling & (np.abs(heights) <= segment.half) & (np.abs(apart - radius) <= width * radius)
-    fruitful = (looks.models[:, 6] > 0) & same(looks.models, segment, *SAME)
-    expected = int((near & fruitful).sum()), int(near.sum())
-    assert Yield(looks).of(segment, width * radius) == expected
-
-
 @laws
 @given(seeds, st.floats(-3, 3))
 def test_counts_do_not_know_unit_place_or_order(seed, exponent):
     rng = np.random.default_rng(seed)
     segment = a_segment(rng)
-    candidates, looks = candidates_about(rng, segment), looks_about(rng, segment)
-    width, scale, shift = 0.2 * segment.model[6], 2.0 ** round(3 * exponent), rng.standard_normal(3)
+    candidates = candidates_about(rng, segment)
+    scale, shift = 2.0 ** round(3 * exponent), rng.standard_normal(3)
     turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
 
     def moved(models):
@@ -122,21 +97,18 @@ def test_counts_do_not_know_unit_place_or_order(seed, exponent):
     order = rng.permutation(len(candidates))
     others = candidates.take(order)
     others = Candidates(moved(others.models), others.parents, others.extents, others.inliers, scale * others.windows)
-    other_looks = Looks(scale * looks.places @ turn.T + shift, scale * looks.windows, moved(looks.models))
     there = Segment(moved(segment.model[None])[0], scale * segment.half, 0.0)
     near, near_there = Neighbourhood(candidates), Neighbourhood(others)
     assert near_there.agreement(there) == near.agreement(segment)
     alive = np.ones(len(candidates), bool)
     there_too = order[near_there.agreeing(there, alive, 0.3, 10.0, 0.2)]
     assert set(there_too) == set(near.agreeing(segment, alive, 0.3, 10.0, 0.2))
-    assert Yield(other_looks).of(there, scale * width) == Yield(looks).of(segment, width)
 
 
 def test_nobody_says_nothing():
     segment = Segment(np.array([0.0, 0, 0, 0, 0, 1, 1]), 2.0, 0.0)
     assert Neighbourhood(Candidates.joined([])).agreement(segment) == (0, 0)
     assert len(Neighbourhood(Candidates.joined([])).agreeing(segment, np.zeros(0, bool), 0.1, 5.0, 0.1)) == 0
-    assert Yield(Looks.joined([])).of(segment, 0.1) == (0, 0)
 
 
 @pytest.mark.parametrize(

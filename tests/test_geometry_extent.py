@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.geometry.extent import LEAST, points_on, visible_extent
+from cylx.geometry.extent import LEAST, coordinates_of, points_on, visible_extent
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=50, deadline=None)
@@ -121,6 +121,24 @@ def test_points_on_a_surface_have_their_heights_and_angles(seed):
     # angles are counted from a direction that depends on the axis alone, one way round or the other
     steps = np.exp(1j * (found_angles - found_angles[:1])), np.exp(1j * (angles[near] - angles[near][:1]))
     assert np.allclose(steps[0], steps[1], atol=1e-9) or np.allclose(steps[0], steps[1].conj(), atol=1e-9)
+
+
+@laws
+@given(seeds)
+def test_coordinates_of_some_points_are_those_of_each(seed):
+    rng = np.random.default_rng(seed)
+    points, direction = rng.standard_normal((50, 3)), rng.standard_normal(3)
+    model = np.array([*rng.standard_normal(3), *direction / np.linalg.norm(direction), 0.7])
+    indices = rng.integers(0, 50, 20)
+    heights, distances, angles = coordinates_of(points, indices, model)
+    offsets = points[indices] - model[:3]
+    assert np.allclose(heights, offsets @ model[3:6], atol=1e-12)
+    off_axis = np.linalg.norm(offsets - heights[:, None] * model[3:6], axis=1)
+    assert np.allclose(distances, off_axis - 0.7, atol=1e-12)
+    assert (np.abs(angles) <= np.pi).all()
+    all_heights, all_angles = points_on(points, model, np.inf)
+    assert np.array_equal(all_heights[indices], heights)
+    assert np.array_equal(all_angles[indices], angles)
 
 
 def test_nothing_is_on_a_surface_far_away():

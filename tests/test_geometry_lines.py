@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.geometry.lines import PARALLEL, common_perpendicular, fit_line
+from cylx.geometry.lines import LEAST, PARALLEL, common_perpendicular, fit_line, off_line
 
 seeds = st.integers(0, 2**32 - 1)
 angles = st.floats(-7, np.log10(1.57)).map(
@@ -127,9 +127,11 @@ def rod(rng, n, length, sigma):
     return rng.standard_normal(3) + along[:, None] * direction + sigma * rng.standard_normal((n, 3)), direction, along
 
 
-def fitted(points):
-    direction = np.full(3, np.nan)
-    return fit_line(np.ascontiguousarray(points), len(points), direction), direction
+def fitted(points, reach=np.inf):
+    """Fit a line; give the distances from it over those along it, and its direction."""
+    place, direction = np.zeros(3), np.full(3, np.nan)
+    across, along = fit_line(np.ascontiguousarray(points), len(points), reach, place, direction)
+    return across / along, direction
 
 
 @laws
@@ -185,12 +187,45 @@ def test_a_disc_and_a_ball_are_no_lines(seed, dimensions):
     assert ratio > 0.7
 
 
-def test_only_the_first_points_count_and_of_four_there_is_no_line():
+@laws
+@given(seeds, st.floats(1.0, 4.0))
+def test_points_out_of_reach_of_zero_do_not_count(seed, reach):
+    rng = np.random.default_rng(seed)
+    points, true, _ = rod(rng, 300, 10.0, 0.05)
+    points -= points.mean(axis=0)
+    near = points[np.linalg.norm(points, axis=1) < reach]
+    beyond = rng.standard_normal((200, 3))
+    beyond *= rng.uniform(1.0, 9.0, (200, 1)) * reach / np.linalg.norm(beyond, axis=1, keepdims=True)
+    ratio, direction = fitted(near)
+    mixed_ratio, mixed = fitted(rng.permutation(np.concatenate([points, beyond])), reach)
+    assert np.linalg.norm(np.cross(mixed, direction)) < 1e-9
+    assert np.isclose(mixed_ratio, ratio, rtol=1e-9)
+    assert np.linalg.norm(np.cross(direction, true)) < 0.3 / reach
+
+
+@laws
+@given(seeds)
+def test_the_place_is_on_the_line_and_the_distances_are_root_mean_squares(seed):
+    rng = np.random.default_rng(seed)
+    points, true, along = rod(rng, 400, 4.0, 0.02)
+    place, direction = np.zeros(3), np.empty(3)
+    across, length = fit_line(points, 400, np.inf, place, direction)
+    middle = points.mean(axis=0)
+    assert np.linalg.norm(np.cross(place - middle, true)) < 0.01
+    assert np.isclose(length, along.std(), rtol=0.1)
+    assert np.isclose(across, np.sqrt(2) * 0.02, rtol=0.2)
+    assert np.allclose(
+        [off_line(points, i, place, direction) for i in range(9)],
+        np.linalg.norm(np.cross(points[:9] - place, direction), axis=1),
+    )
+
+
+def test_only_the_first_points_count_and_of_a_few_there_is_no_line():
     rng = np.random.default_rng(0)
     points, _, _ = rod(rng, 60, 2.0, 0.01)
-    alone, other = np.empty(3), np.empty(3)
-    assert fit_line(points, 40, alone) == fit_line(points[:40].copy(), 40, other)
-    assert np.array_equal(alone, other)
-    for n in range(5):
-        assert fit_line(points, n, alone) == 1.0
-    assert fit_line(points, 5, alone) < 0.1
+    for n in range(LEAST):
+        assert fit_line(points, n, np.inf, np.zeros(3), np.empty(3)) == (np.inf, 1.0)
+    one, other = (np.zeros(3), np.empty(3)), (np.zeros(3), np.empty(3))
+    assert fit_line(points, 40, np.inf, *one) == fit_line(points[:40].copy(), 40, np.inf, *other)
+    assert np.array_equal(one, other)
+    assert fit_line(points, 40, np.inf, *one)[0] < 0.1

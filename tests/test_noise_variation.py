@@ -10,7 +10,7 @@ from cylx.geometry.cells import Cells
 from cylx.noise import noise_by_place
 from cylx.noise.variation import AGREED
 from cylx.records import Ground, Noise
-from cylx.records.clouds import cell_keys
+from cylx.records.clouds import ENOUGH_PATCHES, MOST_NOISE, cell_keys
 from cylx.scene import make_frame
 from cylx.synthetic import single
 
@@ -43,23 +43,6 @@ def test_the_loud_part_of_a_floor_has_its_factor_and_the_quiet_part_has_one(seed
     assert np.abs(loud / times - 1).max() < 0.35
     assert (np.abs(loud / times - 1) < 0.2).mean() > 0.85
     assert (factors[x < 1 - LOUD - border] == 1).all()
-
-
-def lying(frame, point, length, radius):
-    """Give a cylinder along y of the frame, its middle in scene units."""
-    middle = (np.array(point) - frame.origin) / frame.spacing
-    return np.array([*middle, 0.0, 1.0, 0.0, radius / frame.spacing]), 0.5 * length / frame.spacing
-
-
-def test_a_cylinder_has_the_noise_of_its_place():
-    frame, _ = make_frame(floor(3, 0.1, 3.0), Config())
-    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), frame.noise)
-    for x, times in ((0.15, 1.0), (0.8, 3.0)):
-        model, half = lying(frame, (x, 0.5, 0.0), 0.6, 0.02)
-        usual = frame.noise.at(2 * model[6])
-        assert np.isclose(ground.noise_about(model, half), times * usual, rtol=0.1)
-        model[:3] += [0, 0, 1e4]  # nobody knows what it is like up there
-        assert ground.noise_about(model, half) == usual
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -155,26 +138,75 @@ def test_factors_are_looked_up_by_cell(seed, side):
     assert np.allclose(noise.about(places, 2.0), 0.2 * noise.factors_at(places))
 
 
+def ground_of(patches, cells=None, factor=1.0):
+    """Give a ground that knows nothing but its noise: 0.1 usually, and in one cell, of the side 10, so many times."""
+    known = {} if cells is None else {"side": 10.0, "cells": cell_keys(cells), "factors": np.full(len(cells), factor)}
+    noise = Noise(np.array([1.0]), np.array([0.1]), **known, patches=patches)
+    return Ground(Cells(np.zeros((1, 3)), np.zeros(1, np.int64)), np.zeros(1), noise)
+
+
+def patches_on(rng, model, half, count, times, size=0.2):
+    """Give patches on the surface of a cylinder, of so many radii, and of about so many times the usual noise."""
+    turn = np.linalg.qr(np.column_stack([model[3:6], rng.standard_normal((3, 2))]))[0]
+    angles, heights = rng.uniform(0, 2 * np.pi, count), rng.uniform(-half, half, count)
+    local = np.column_stack([heights, model[6] * np.cos(angles), model[6] * np.sin(angles)])
+    places = local @ turn.T + model[:3]
+    return np.column_stack([places, np.full(count, size * model[6]), times * np.exp(0.05 * rng.standard_normal(count))])
+
+
+def drawn(seed):
+    rng = np.random.default_rng(seed)
+    direction = rng.standard_normal(3)
+    model = np.array([*rng.uniform(2, 8, 3), *direction / np.linalg.norm(direction), rng.uniform(1, 3)])
+    return rng, model, rng.uniform(1, 9)
+
+
+@laws
+@given(seeds, st.floats(1.5, 3.5))
+def test_a_cylinder_has_the_noise_of_the_patches_on_its_surface(seed, times):
+    rng, model, half = drawn(seed)
+    own = patches_on(rng, model, half, 21, times)
+    within = model.copy()
+    within[6] *= 0.3
+    others = [
+        patches_on(rng, within, half, 50, 0.5 * times, 0.05),  # on a smaller one inside it
+        patches_on(rng, model, half, 50, 9.0, 0.9),  # as large as itself: they show its curvature
+    ]
+    ground = ground_of(rng.permutation(np.concatenate([own, *others])))
+    assert np.isclose(ground.noise_about(model, half), 0.1 * np.median(own[:, 4]))
+    # beyond its ends there are none, and nobody knows better than what is usual
+    model[:3] += (2.1 * half + 4 * model[6]) * model[3:6]
+    assert ground.noise_about(model, half) == pytest.approx(0.1)
+
+
 @laws
 @given(seeds)
-def test_noise_about_a_cylinder_is_the_median_of_what_is_known_on_its_surface(seed):
-    rng = np.random.default_rng(seed)
-    loud = rng.uniform(1.5, 6)
-    cells = np.array([[x, y, z] for x in range(2) for y in range(8) for z in range(8)])
-    keys = cell_keys(cells)
-    order = np.argsort(keys)
-    factors = np.where(cells[:, 0] == 1, loud, 1.0)[order]
-    noise = Noise(np.array([1.0, 4.0]), np.array([0.1, 0.4]), 10.0, keys[order], factors)
-    ground = Ground(Cells(np.zeros((1, 3)), np.zeros(1, np.int64)), np.zeros(1), noise)
-    radius, half = rng.uniform(0.2, 4), rng.uniform(0, 20)
-    turn = rng.uniform(0, 2 * np.pi)
-    for x, times in ((5.0, 1.0), (15.0, loud)):
-        model = np.array([x, 40, 40, 0, np.cos(turn), np.sin(turn), radius])
-        assert np.isclose(ground.noise_about(model, half), times * noise.at(2 * radius))
-    # nine rings, of which five lie on one side of the border
-    for x, times in ((9.5, 1.0), (10.5, loud)):
-        model = np.array([x, 35, 35, 1, 0, 0, radius])
-        assert np.isclose(ground.noise_about(model, 8.0), times * noise.at(2 * radius))
-    # where most of the surface is unknown, what is known counts
-    beyond = np.array([22.0, 35, 35, 1, 0, 0, radius])
-    assert np.isclose(ground.noise_about(beyond, 10.0), loud * noise.at(2 * radius))
+def test_no_surface_is_less_noisy_than_usual_or_many_times_more(seed):
+    rng, model, half = drawn(seed)
+    for times, expected in ((0.4, 1.0), (1.05, 1.0), (30.0, MOST_NOISE)):
+        ground = ground_of(patches_on(rng, model, half, 40, times))
+        assert np.isclose(ground.noise_about(model, half), 0.1 * expected)
+
+
+@pytest.mark.parametrize("count", [0, ENOUGH_PATCHES - 1])
+def test_where_patches_are_few_the_place_says_what_the_noise_is(count):
+    rng, model, half = drawn(1)
+    few = patches_on(rng, model, half, count, 3.0)
+    here, there = np.zeros((1, 3), np.int64), np.full((1, 3), 5)
+    assert np.isclose(ground_of(few, here, 2.0).noise_about(model, half), 0.2)
+    assert np.isclose(ground_of(few, there, 2.0).noise_about(model, half), 0.1)
+    assert np.isclose(ground_of(few).noise_about(model, half), 0.1)
+    enough = patches_on(rng, model, half, ENOUGH_PATCHES, 3.0)
+    assert np.isclose(ground_of(enough, here, 2.0).noise_about(model, half), 0.3, rtol=0.1)
+
+
+def test_the_frame_knows_its_patches():
+    frame, scene = make_frame(floor(3, 0.1, 3.0), Config())
+    patches = frame.noise.patches
+    x = patches[:, 0] * frame.spacing + frame.origin[0]
+    assert len(patches) > 1000
+    assert (patches[:, 3] > 2).all()  # spacings
+    assert (patches[:, 3] < 12).all()
+    assert np.isclose(np.median(patches[x < 0.5, 4]), 1.0, rtol=0.1)
+    assert np.isclose(np.median(patches[x > 0.7, 4]), 3.0, rtol=0.1)
+    assert scene.noise > 0
