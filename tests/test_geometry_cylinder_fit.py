@@ -9,11 +9,14 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cylx.geometry.cylinder_fit import (
+    SHARP,
     TUKEY,
     TUKEY_SPREAD,
     Kernel,
     candidate_quality,
     fit_cylinder,
+    move_to_foot,
+    polish,
     unbiased_radius,
 )
 
@@ -233,3 +236,116 @@ def test_the_quality_counts_what_supports_a_cylinder(seed):
 def test_nothing_supports_a_cylinder_beside_the_points():
     (count, extent, filled, inside), _ = quality_of(5.0 + np.zeros((9, 3)), UNIT, 0.1)
     assert (count, extent, filled, inside) == (0, 0, 0, 0)
+
+
+LIMITS = 0.1, 10.0, 15, 0.25, 0.5
+"""Least and greatest radius; fewest points, least share of all, least length along the axis."""
+
+
+def polished(points, start, noise, limits=LIMITS):
+    """Polish a copy of a rough cylinder; give what it is said to be, the model and its quality."""
+    model, quality = start.copy(), np.full(5, np.nan)
+    return polish(np.ascontiguousarray(points), len(points), model, noise, *limits, quality), model, quality
+
+
+@laws
+@given(seeds, st.floats(90, 360), st.floats(0.003, 0.02))
+def test_a_rough_cylinder_becomes_the_true_one(seed, theta_deg, sigma):
+    rng = np.random.default_rng(seed)
+    points, angles, heights = sample(rng, 300, theta_deg, sigma=sigma)
+    fit, model, quality = polished(points, rough(rng, 0.1), sigma)
+    assert fit == 2
+    # a fixed width of three deviations takes off the outer tenth of the information
+    assert (np.abs(deviations(model)) < 6 * bound(angles, heights, sigma) + 3 * sigma**2).all()
+    assert quality[0] >= 0.97 * 300
+    assert np.isclose(quality[1], np.ptp(points @ model[3:6]), atol=0.3)
+    assert abs(quality[2] - theta_deg / 360) < 4 / 36
+    assert quality[3] <= 300 - quality[0]
+    assert 0.6 * sigma < quality[4] < 1.1 * sigma
+
+
+@laws
+@given(seeds)
+def test_others_beside_and_within_do_not_draw_it_away(seed):
+    rng = np.random.default_rng(seed)
+    points, _, _ = sample(rng, 300, 200.0, sigma=0.01)
+    clutter = np.concatenate(
+        [rng.uniform(-0.5, 0.5, (60, 3)), rng.uniform([1.5, -1.5, -1.5], [2.5, 1.5, 1.5], (60, 3))]
+    )
+    fit, model, quality = polished(rng.permutation(np.concatenate([points, clutter])), rough(rng, 0.05), 0.01)
+    assert fit == 2
+    assert np.abs(deviations(model)).max() < 0.02
+    assert 290 <= quality[0] <= 310
+    assert quality[3] >= 50
+
+
+@settings(max_examples=8, deadline=None)
+@given(seeds)
+def test_points_of_no_surface_are_no_cylinder(seed):
+    rng = np.random.default_rng(seed)
+    assert polished(rng.uniform(-2, 2, (800, 3)), UNIT, 0.01)[0] < 2  # by chance a few lie closer to a surface
+    assert polished(rng.uniform(-2, 2, (30000, 3)), UNIT, 0.01)[0] == 0  # as even within the kernel as anywhere
+
+
+def test_what_is_missing_is_told_from_what_does_not_fit():
+    rng = np.random.default_rng(3)
+    points, _, _ = sample(rng, 200, 180.0, height=2.0)
+    crowd = np.concatenate([points, np.tile([[9.0, 9, 9]], (500, 1))])
+    start = rough(rng, 0.02)
+    for cloud, limits, expected in (
+        (points, LIMITS, 2),
+        (points, (1.1, 10.0, *LIMITS[2:]), 0),
+        (points, (0.1, 0.9, *LIMITS[2:]), 0),
+        (points, (0.1, 10.0, 201, 0.25, 0.5), 1),
+        (crowd, LIMITS, 2),
+        (crowd, (0.1, 10.0, 15, 0.4, 0.5), 1),
+        (points, (0.1, 10.0, 15, 0.25, 2.5), 1),
+        (points[:7], LIMITS, 0),
+        (points[:0], LIMITS, 0),
+        (points + 9.0, LIMITS, 0),
+    ):
+        assert polished(cloud, start, 0.01, limits)[0] == expected
+
+
+@laws
+@given(seeds, st.floats(-3, 3))
+def test_the_polish_follows_motion_and_scale(seed, exponent):
+    rng = np.random.default_rng(seed)
+    points, _, _ = sample(rng, 150, 200.0, sigma=0.02)
+    start, scale = rough(rng), 10.0**exponent
+    turn, shift = Rotation.from_quat(rng.standard_normal(4)).as_matrix(), scale * rng.standard_normal(3)
+    fit, one, quality = polished(points, start, 0.02)
+    moved = np.concatenate([scale * turn @ start[:3] + shift, turn @ start[3:6], [scale * start[6]]])
+    limits = scale * LIMITS[0], scale * LIMITS[1], *LIMITS[2:4], scale * LIMITS[4]
+    other_fit, other, other_quality = polished(scale * points @ turn.T + shift, moved, scale * 0.02, limits)
+    assert other_fit == fit
+    # both end with a step below a hundredth of the spread, not always with the same one
+    tolerance = 0.02 * quality[4]
+    assert np.linalg.norm(np.cross(other[:3] - scale * turn @ one[:3] - shift, other[3:6])) < tolerance * scale
+    assert np.allclose(other[3:6], turn @ one[3:6], rtol=0, atol=tolerance)
+    assert np.isclose(other[6], scale * one[6], rtol=tolerance)
+    assert np.isclose(other_quality[4], scale * quality[4], rtol=0.02)
+    assert np.allclose(other_quality[[0, 3]], quality[[0, 3]], rtol=0, atol=2)
+
+
+def test_the_limit_of_sharpness_lies_between_noise_and_an_even_background():
+    # weighted by the biweight of half width 1
+    x = np.linspace(-1, 1, 20001)
+    weight = (1 - x * x) ** 2
+    even = np.sqrt((weight * x * x).sum() / weight.sum())
+    gauss = weight * np.exp(-0.5 * (3 * x) ** 2)
+    noisy = np.sqrt((gauss * x * x).sum() / gauss.sum())
+    assert noisy < 0.9 * SHARP < SHARP < 0.95 * even
+
+
+@laws
+@given(seeds)
+def test_the_foot_is_the_point_of_the_axis_next_to_the_centre(seed):
+    rng = np.random.default_rng(seed)
+    direction, center = rng.standard_normal(3), 10 * rng.standard_normal(3)
+    model = np.array([*rng.standard_normal(3), *direction / np.linalg.norm(direction), 2.0])
+    moved = model.copy()
+    move_to_foot(moved, center)
+    assert abs((moved[:3] - center) @ model[3:6]) < 1e-12
+    assert np.allclose(np.cross(moved[:3] - center - model[:3], model[3:6]), 0, atol=1e-12)
+    assert np.array_equal(moved[3:], model[3:])

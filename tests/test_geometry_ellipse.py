@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.geometry.ellipse import Degenerate, Ellipse, ellipse_distances, fit_ellipse, search_ellipse
+from cylx.geometry.ellipse import Degenerate, Ellipse, conic_shape, ellipse_distances, fit_ellipse, search_ellipse
 
 seeds = st.integers(0, 2**32 - 1)
 angles = st.floats(0, np.pi, exclude_max=True)
@@ -257,3 +257,45 @@ def test_samples_with_repeated_points_are_passed_over():
     repeated, good = np.array([[0, 0, 1, 2, 3], [5, 6, 7, 7, 7]]), np.array([[0, 6, 12, 18, 24]])
     assert isinstance(search_ellipse(points, repeated, 0.01, (0.1, 10), 4.0), Degenerate)
     assert isinstance(search_ellipse(points, np.vstack([repeated, good]), 0.01, (0.1, 10), 4.0), tuple)
+
+
+factors = st.floats(-6, 6).map(lambda exponent: 10.0**exponent) | st.floats(-6, 6).map(
+    lambda exponent: -(10.0**exponent)
+)
+
+
+@laws
+@given(seeds, angles, aspects, exponents, factors)
+def test_the_shape_of_a_conic_is_its_ellipse_whatever_its_factor(seed, angle, aspect, exponent, factor):
+    scale = 10.0**exponent
+    expected = Ellipse(scale * 3 * np.random.default_rng(seed).standard_normal(2), scale * aspect, scale, angle)
+    shape = np.full(5, np.nan)
+    assert conic_shape(factor * expected.conic(), shape)
+    assert_same(Ellipse(shape[:2], *shape[2:]), expected, 1e-9)
+
+
+def test_a_circle_of_a_conic_has_equal_axes():
+    shape = np.empty(5)
+    for factor in (2.0, -0.5):
+        # (x - 1)^2 + (y + 2)^2 = 9
+        assert conic_shape(factor * np.array([1.0, 0, 1, -2, 4, -4]), shape)
+        assert np.allclose(shape[:4], [1, -2, 3, 3], rtol=1e-15)
+
+
+NO_ELLIPSES = {
+    "hyperbola": [1, 0, -1, 0, 0, -1],
+    "parabola": [1, 0, 0, 0, -1, 0],
+    "line": [0, 0, 0, 1, 1, 1],
+    "two lines": [1, 0, 0, 0, 0, -1],
+    "a point": [1, 0, 1, 0, 0, 0],
+    "nothing real": [1, 0, 2, 0, 0, 1],
+    "nothing at all": [0, 0, 0, 0, 0, 0],
+}
+
+
+@pytest.mark.parametrize("name", NO_ELLIPSES)
+@pytest.mark.parametrize("factor", [1.0, -1.0, 1e-3])
+def test_other_conics_are_no_ellipses(name, factor):
+    shape = np.full(5, np.nan)
+    assert not conic_shape(factor * np.array(NO_ELLIPSES[name], dtype=np.float64), shape)
+    assert np.isnan(shape).all()

@@ -1,4 +1,4 @@
-"""Pairs of lines: their feet, their angle, and the axis of the motion from one to the other."""
+"""Pairs of lines: their feet, their angle, and the axis of the motion from one to the other; lines through points."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.geometry.lines import PARALLEL, common_perpendicular
+from cylx.geometry.lines import LEAST, PARALLEL, common_perpendicular, fit_line, off_line
 
 seeds = st.integers(0, 2**32 - 1)
 angles = st.floats(-7, np.log10(1.57)).map(
@@ -117,3 +117,115 @@ def test_many_pairs_at_once_are_the_same_as_one_by_one():
     for i, row in enumerate(rows):
         alone = common_perpendicular(*row[:4])
         assert all(np.allclose(a[i], b, rtol=1e-15, atol=1e-15) for a, b in zip(together, alone, strict=True))
+
+
+def rod(rng, n, length, sigma):
+    """Give points that scatter about a piece of a line, and its direction."""
+    direction = rng.standard_normal(3)
+    direction /= np.linalg.norm(direction)
+    along = rng.uniform(-0.5, 0.5, n) * length
+    return rng.standard_normal(3) + along[:, None] * direction + sigma * rng.standard_normal((n, 3)), direction, along
+
+
+def fitted(points, reach=np.inf):
+    """Fit a line; give the distances from it over those along it, and its direction."""
+    place, direction = np.zeros(3), np.full(3, np.nan)
+    across, along = fit_line(np.ascontiguousarray(points), len(points), reach, place, direction)
+    return across / along, direction
+
+
+@laws
+@given(seeds, st.floats(-4, -1.5), st.integers(20, 400))
+def test_a_line_is_fitted_as_well_as_its_noise_allows(seed, exponent, n):
+    rng = np.random.default_rng(seed)
+    sigma = 3 * 10.0**exponent
+    points, true, along = rod(rng, n, 3.0, sigma)
+    ratio, direction = fitted(points)
+    # across the line each of two angles has the variance sigma^2 over the sum of squares along it
+    bound = sigma * np.sqrt(2 / ((along - along.mean()) ** 2).sum())
+    assert np.isclose(np.linalg.norm(direction), 1.0)
+    assert np.linalg.norm(np.cross(direction, true)) < 5 * bound
+    assert 0.3 < ratio / (np.sqrt(2) * sigma / along.std()) < 1.3
+
+
+@laws
+@given(seeds, st.integers(1, 20))
+def test_a_few_points_beside_a_line_do_not_turn_it(seed, outliers):
+    rng = np.random.default_rng(seed)
+    points, true, along = rod(rng, 200, 10.0, 0.02)
+    aside = np.cross(true, rng.standard_normal(3))
+    aside *= rng.uniform(2.0, 4.0) / np.linalg.norm(aside)
+    lump = points[rng.integers(200)] + aside + 0.3 * rng.standard_normal((outliers, 3))
+    ratio, direction = fitted(rng.permutation(np.concatenate([points, lump])))
+    # the first fit is turned by a lump at one end, and leaves out what is 2.5 deviations from it; the last one is not
+    assert np.linalg.norm(np.cross(direction, true)) < 0.02
+    assert ratio < 0.03
+    bare, _ = fitted(points)
+    assert np.isclose(bare, np.sqrt(2) * 0.02 / along.std(), rtol=0.3)
+
+
+@laws
+@given(seeds, st.floats(-3, 3))
+def test_the_line_follows_motion_and_scale_and_does_not_know_the_order(seed, exponent):
+    rng = np.random.default_rng(seed)
+    points, _, _ = rod(rng, 100, 2.0, 0.05)
+    turn, scale = Rotation.from_quat(rng.standard_normal(4)).as_matrix(), 10.0**exponent
+    ratio, direction = fitted(points)
+    moved_ratio, moved = fitted(rng.permutation(scale * points @ turn.T + scale * rng.standard_normal(3)))
+    assert np.linalg.norm(np.cross(moved, turn @ direction)) < 1e-9
+    assert np.isclose(moved_ratio, ratio, rtol=1e-9)
+
+
+@laws
+@given(seeds, st.sampled_from([2, 3]))
+def test_a_disc_and_a_ball_are_no_lines(seed, dimensions):
+    rng = np.random.default_rng(seed)
+    points = np.zeros((500, 3))
+    points[:, :dimensions] = rng.standard_normal((500, dimensions))
+    points /= np.maximum(1.0, np.linalg.norm(points, axis=1, keepdims=True))
+    ratio, _ = fitted(points @ Rotation.from_quat(rng.standard_normal(4)).as_matrix().T)
+    assert ratio > 0.7
+
+
+@laws
+@given(seeds, st.floats(1.0, 4.0))
+def test_points_out_of_reach_of_zero_do_not_count(seed, reach):
+    rng = np.random.default_rng(seed)
+    points, true, _ = rod(rng, 300, 10.0, 0.05)
+    points -= points.mean(axis=0)
+    near = points[np.linalg.norm(points, axis=1) < reach]
+    beyond = rng.standard_normal((200, 3))
+    beyond *= rng.uniform(1.0, 9.0, (200, 1)) * reach / np.linalg.norm(beyond, axis=1, keepdims=True)
+    ratio, direction = fitted(near)
+    mixed_ratio, mixed = fitted(rng.permutation(np.concatenate([points, beyond])), reach)
+    assert np.linalg.norm(np.cross(mixed, direction)) < 1e-9
+    assert np.isclose(mixed_ratio, ratio, rtol=1e-9)
+    assert np.linalg.norm(np.cross(direction, true)) < 0.3 / reach
+
+
+@laws
+@given(seeds)
+def test_the_place_is_on_the_line_and_the_distances_are_root_mean_squares(seed):
+    rng = np.random.default_rng(seed)
+    points, true, along = rod(rng, 400, 4.0, 0.02)
+    place, direction = np.zeros(3), np.empty(3)
+    across, length = fit_line(points, 400, np.inf, place, direction)
+    middle = points.mean(axis=0)
+    assert np.linalg.norm(np.cross(place - middle, true)) < 0.01
+    assert np.isclose(length, along.std(), rtol=0.1)
+    assert np.isclose(across, np.sqrt(2) * 0.02, rtol=0.2)
+    assert np.allclose(
+        [off_line(points, i, place, direction) for i in range(9)],
+        np.linalg.norm(np.cross(points[:9] - place, direction), axis=1),
+    )
+
+
+def test_only_the_first_points_count_and_of_a_few_there_is_no_line():
+    rng = np.random.default_rng(0)
+    points, _, _ = rod(rng, 60, 2.0, 0.01)
+    for n in range(LEAST):
+        assert fit_line(points, n, np.inf, np.zeros(3), np.empty(3)) == (np.inf, 1.0)
+    one, other = (np.zeros(3), np.empty(3)), (np.zeros(3), np.empty(3))
+    assert fit_line(points, 40, np.inf, *one) == fit_line(points[:40].copy(), 40, np.inf, *other)
+    assert np.array_equal(one, other)
+    assert fit_line(points, 40, np.inf, *one)[0] < 0.1

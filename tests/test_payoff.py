@@ -189,3 +189,66 @@ def test_nobody_plays_alone():
     assert len(local_payoff(*nobody, np.empty(0), 0.05, 0.1, 0.06, 0.5).degrees()) == 0
     alone = local_payoff(np.array([model()]), np.arange(1), np.zeros(1), 0.05, 0.1, 0.06, 0.5)
     assert alone.degrees().tolist() == [0.0]
+
+
+def reaching(seed, count):
+    """Give models about a few axes whose radii differ a thousandfold and whose extents differ more."""
+    rng = np.random.default_rng(seed)
+    axes = rng.standard_normal((5, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    truth = rng.integers(0, 5, count)
+    radii = 10.0 ** rng.uniform(-1.5, 1.5, 5)[truth] * rng.uniform(0.9, 1.1, count)
+    extents = radii * 10.0 ** rng.uniform(-2, 2, count) * (rng.random(count) < 0.8)
+    points = rng.standard_normal((5, 3))[truth] + 10 * radii[:, None] * rng.uniform(-1, 1, (count, 1)) * axes[truth]
+    points += 0.1 * radii[:, None] * rng.standard_normal((count, 3))
+    directions = axes[truth] + 0.03 * rng.standard_normal((count, 3))
+    directions *= rng.choice([-1, 1], (count, 1)) / np.linalg.norm(directions, axis=1, keepdims=True)
+    return np.column_stack([points, directions, radii]), rng.integers(0, count, count), extents
+
+
+@settings(max_examples=20, deadline=None)
+@given(seeds, st.floats(0.05, 0.95))
+def test_candidates_of_very_different_reaches_miss_nobody(seed, min_ratio):
+    models, parents, extents = reaching(seed, 60)
+    widths = 0.1, 0.3, 0.15, min_ratio
+    expected = brute_force(models, parents, extents, *widths)
+    found = dense(local_payoff(models, parents, extents, *widths), 60)
+    assert ((np.abs(found - expected) < 1e-9) | (np.abs(np.maximum(found, expected) - CUT) < 1e-9)).all()
+    assert np.array_equal(found, found.T)
+
+
+def assert_same_rows(one, other, count):
+    """Compare payoffs row by row, whatever the order in a row."""
+    for i in range(count):
+        columns, values = one.row(i)
+        others, other_values = other.row(i)
+        order, other_order = np.argsort(columns), np.argsort(others)
+        assert np.array_equal(columns[order], others[other_order])
+        assert np.array_equal(values[order], other_values[other_order])
+
+
+@pytest.mark.parametrize("piece", [1, 7, 50])
+@pytest.mark.parametrize("seed", range(2))
+def test_threads_and_pieces_make_no_difference(monkeypatch, seed, piece):
+    models, parents, extents = reaching(seed, 400)
+    widths = 0.1, 0.3, 0.15, 0.7
+    whole = local_payoff(models, parents, extents, *widths)
+    assert len(whole.values) > 2000
+    monkeypatch.setattr("cylx.payoff.PIECE", piece)
+    one = local_payoff(models, parents, extents, *widths)
+    assert_same_rows(one, whole, 400)
+    for threads in (2, 5):
+        other = local_payoff(models, parents, extents, *widths, threads=threads)
+        for name in ("pointers", "indices", "values"):
+            assert np.array_equal(getattr(other, name), getattr(one, name)), name
+
+
+def test_a_row_holds_each_partner_once():
+    models, parents, extents = reaching(3, 300)
+    payoff = local_payoff(models, parents, extents, 0.1, 0.3, 0.15, 0.7)
+    for i in range(300):
+        columns, values = payoff.row(i)
+        assert len(set(columns)) == len(columns)
+        assert i not in columns
+        assert (parents[columns] != parents[i]).all()
+        assert ((values > 0) & (values <= 1)).all()

@@ -49,6 +49,24 @@ def test_a_cylinder_shows_its_spacing_and_noise(n, theta_deg, sigma):
     assert np.isclose(scene.extent, np.linalg.norm([2, 2, 4]) if theta_deg == 360 else 4.25, rtol=0.05)
 
 
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("share", [0.05, 0.15, 0.3, 0.5])
+@pytest.mark.parametrize("kind", ["room", "whole", "part"])
+def test_spacing_and_noise_are_those_put_in_from_next_to_nothing_to_half_a_spacing(kind, share, seed):
+    if kind == "room":
+        clean = multi(points=8000, sigma=0.0, noise=0.0, seed=seed)
+        floor = (clean.points[:, 2] < 1e-9).sum()  # things that touch it are too few to count
+        spacing = clean.params["room"] / np.sqrt(floor)
+        scene = multi(points=8000, sigma=share * spacing, noise=0.0, seed=seed)
+    else:
+        theta_deg = 360.0 if kind == "whole" else 120.0
+        spacing = np.sqrt(np.radians(theta_deg) * 4 / 6000)
+        scene = single(points=6000, sigma=share * spacing, theta_deg=theta_deg, seed=seed)
+    measured = measure_scene(scene.points)
+    assert np.isclose(measured.spacing, spacing, rtol=0.1)
+    assert np.isclose(measured.noise, share * spacing, rtol=0.1)
+
+
 @pytest.mark.parametrize("sigma", [0.002, 0.005])
 def test_a_room_full_of_things_shows_the_noise_of_its_surfaces(sigma):
     scene = multi(points=12000, sigma=sigma, noise=0.05, seed=4)

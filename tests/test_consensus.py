@@ -1,0 +1,130 @@
+"""What the candidates say of a cylinder: the quick search by place against a look at all of them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cylx.consensus import SAME, WITNESS, Neighbourhood, is_contradicted
+from cylx.records import Candidates, Segment
+
+seeds = st.integers(0, 2**32 - 1)
+laws = settings(max_examples=60, deadline=None)
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def a_segment(rng):
+    """Give a cylinder; its axis is often one of the coordinates, where a search by place has its corners."""
+    direction = unit(rng.standard_normal(3)) if rng.random() < 0.6 else np.eye(3)[rng.integers(3)] * rng.choice([-1, 1])
+    model = np.array([*(5 * rng.standard_normal(3)), *direction, np.exp(rng.uniform(-2, 1))])
+    return Segment(model, np.exp(rng.uniform(-2, 2)), 0.0)
+
+
+def models_about(rng, segment, count):
+    """Give candidates that mostly are the cylinder, some hardly and some not at all, all along it and beside."""
+    point, direction, radius = segment.model[:3], segment.model[3:6], segment.model[6]
+    sloppy = rng.choice([0.0, 0.05, 0.3, 2.0], (count, 1))
+    points = point + 1.6 * segment.half * rng.uniform(-1, 1, (count, 1)) * direction
+    points = points + radius * sloppy * rng.standard_normal((count, 3))
+    directions = unit(direction + 0.5 * sloppy * rng.standard_normal((count, 3))) * rng.choice([-1, 1], (count, 1))
+    radii = radius * np.exp(0.5 * sloppy[:, 0] * rng.standard_normal(count))
+    return np.column_stack([points, directions, radii])
+
+
+def candidates_about(rng, segment, count=200):
+    windows = segment.model[6] * np.exp(rng.uniform(-2, 2, count))
+    return Candidates(models_about(rng, segment, count), np.arange(count), np.zeros(count), np.full(count, 20), windows)
+
+
+def distances(points, segment):
+    """Give heights and distances from the axis."""
+    offsets = points - segment.model[:3]
+    heights = offsets @ segment.model[3:6]
+    return heights, np.linalg.norm(offsets - heights[:, None] * segment.model[3:6], axis=1)
+
+
+def same(models, segment, offset, cosine, radius):
+    """Tell which models agree with a cylinder; offset in its radii."""
+    _, apart = distances(models[:, :3], segment)
+    turns = np.abs(models[:, 3:6] @ segment.model[3:6])
+    return (
+        (apart < offset * segment.model[6]) & (turns > cosine) & (np.abs(models[:, 6] / segment.model[6] - 1) < radius)
+    )
+
+
+@laws
+@given(seeds)
+def test_agreement_is_that_of_all_candidates(seed):
+    rng = np.random.default_rng(seed)
+    segment = a_segment(rng)
+    candidates = candidates_about(rng, segment)
+    heights, apart = distances(candidates.points, segment)
+    telling = candidates.windows > WITNESS * min(segment.model[6], 1.2 * segment.half)
+    near = telling & (np.abs(heights) < segment.half) & (apart < segment.model[6])
+    expected = int((near & same(candidates.models, segment, *SAME)).sum()), int(near.sum())
+    assert Neighbourhood(candidates).agreement(segment) == expected
+
+
+@laws
+@given(seeds, st.floats(0.01, 1.0), st.floats(1, 60), st.floats(0.01, 0.9))
+def test_those_who_agree_are_all_who_do_and_are_alive(seed, offset, angle_deg, radius):
+    rng = np.random.default_rng(seed)
+    segment = a_segment(rng)
+    candidates = candidates_about(rng, segment)
+    alive = rng.random(len(candidates)) < 0.7
+    heights, apart = distances(candidates.points, segment)
+    near = (np.abs(heights) < segment.half + segment.model[6]) & (apart < segment.model[6])
+    expected = near & alive & same(candidates.models, segment, offset, np.cos(np.radians(angle_deg)), radius)
+    found = Neighbourhood(candidates).agreeing(segment, alive, offset, angle_deg, radius)
+    assert np.array_equal(np.sort(found), np.flatnonzero(expected))
+
+
+@laws
+@given(seeds, st.floats(-3, 3))
+def test_counts_do_not_know_unit_place_or_order(seed, exponent):
+    rng = np.random.default_rng(seed)
+    segment = a_segment(rng)
+    candidates = candidates_about(rng, segment)
+    scale, shift = 2.0 ** round(3 * exponent), rng.standard_normal(3)
+    turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+
+    def moved(models):
+        return np.column_stack([scale * models[:, :3] @ turn.T + shift, models[:, 3:6] @ turn.T, scale * models[:, 6]])
+
+    order = rng.permutation(len(candidates))
+    others = candidates.take(order)
+    others = Candidates(moved(others.models), others.parents, others.extents, others.inliers, scale * others.windows)
+    there = Segment(moved(segment.model[None])[0], scale * segment.half, 0.0)
+    near, near_there = Neighbourhood(candidates), Neighbourhood(others)
+    assert near_there.agreement(there) == near.agreement(segment)
+    alive = np.ones(len(candidates), bool)
+    there_too = order[near_there.agreeing(there, alive, 0.3, 10.0, 0.2)]
+    assert set(there_too) == set(near.agreeing(segment, alive, 0.3, 10.0, 0.2))
+
+
+def test_nobody_says_nothing():
+    segment = Segment(np.array([0.0, 0, 0, 0, 0, 1, 1]), 2.0, 0.0)
+    assert Neighbourhood(Candidates.joined([])).agreement(segment) == (0, 0)
+    assert len(Neighbourhood(Candidates.joined([])).agreeing(segment, np.zeros(0, bool), 0.1, 5.0, 0.1)) == 0
+
+
+@pytest.mark.parametrize(
+    ("counts", "contradicted"),
+    [((0, 0), False), ((0, 11), False), ((0, 12), True), ((1, 12), True), ((2, 12), False), ((4, 30), False),
+     ((4, 31), True), ((16, 100), False), ((16, 101), True), ((100, 500), False), ((1000, 3000), False)],
+)  # fmt: skip
+def test_few_who_agree_among_many_contradict(counts, contradicted):
+    assert is_contradicted(counts) is contradicted
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 300), st.integers(0, 300))
+def test_more_who_agree_never_contradict_more(consistent, others):
+    near = consistent + others
+    if not is_contradicted((consistent, near)):
+        assert not is_contradicted((consistent + 1, near + 1))
+        assert others == 0 or not is_contradicted((consistent + 1, near))
+    assert not is_contradicted((max(consistent, near // 3), near))
