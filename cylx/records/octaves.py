@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.morton import cell_starts, pick_one, thin
+from cylx.geometry.morton import cell_starts, pick_one
 from cylx.records.clouds import Frame
 
 FloatArray = NDArray[np.float64]
@@ -63,16 +63,18 @@ class Octave:
         side = frame.unit * 2.0 ** (level + 3)
         return cls(radius, level, frame.points[indices], codes, indices, cells, starts, side, members, runs)
 
-    def seeds(self, enough: int, keep: MaskArray | None = None) -> IndexArray:
+    def seeds(self, enough: int, keep: MaskArray | None = None, least: int = 1) -> IndexArray:
         """Choose places for windows, evenly: indices of points, one of each cell of sixteen voxels' width.
 
-        Of eight or of four where that makes fewer than `enough`; only points to `keep`, if given.
+        Of eight or of four where that makes fewer than `enough`; only points to `keep`, if given, and only where a cell
+        holds at least so many of them.
         """
+        members = np.arange(len(self.codes)) if keep is None else np.flatnonzero(keep)
         for shift in (4, 3, 2):
-            chosen = thin(self.codes, self.level + shift, keep)
-            if len(chosen) >= enough:
+            cells, starts = cell_starts(self.codes[members], self.level + shift)
+            if len(cells) >= enough:
                 break
-        return chosen
+        return members[pick_one(cells, starts)[np.diff(starts) >= least]]
 
     def spread(self, marks: MaskArray, out: MaskArray) -> None:
         """Mark all members of the voxels whose point is marked."""

@@ -33,6 +33,8 @@ FLAT_SHARE = 0.9
 """Share of a window's points within three noises of its plane that makes it flat."""
 OUTCOMES = ("too few points", "flat", "no curvature", "does not fit", "badly supported", "kept")
 LEAST_POINTS = 25
+LONELY = 3
+"""No window is laid about points that have fewer than this in their cell: most of them are noise."""
 COLUMNS = 9
 """Numbers a window fills in: the model (7), inliers, extent."""
 
@@ -65,7 +67,7 @@ def find_curved_windows(
         octave = Octave.of(frame, radius, explained.flatness == 0)
         if len(octave.points) < LEAST_POINTS:
             continue
-        seeds = octave.seeds(FEW_SEEDS)
+        seeds = octave.seeds(FEW_SEEDS, least=LONELY)
         rows, outcome, planes, marks = _look(frame, octave, seeds, radius_range, config, threads)
         counts += np.bincount(outcome, minlength=len(OUTCOMES))
         octave.spread(marks, explained.curved)

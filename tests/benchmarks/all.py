@@ -28,6 +28,7 @@ QUICK = {
     "recall-height": "recall.py --only height",
     "recall-points": "recall.py --only points",
     "recall-outliers": "recall.py --only outliers",
+    "sources": "sources.py",
     "negatives": "negatives.py --max-found 0",
     "cans": "scenes.py scenes/five?.ply scenes/pair?.ply --min-f1 1",
     "pair": "pair.py scenes/pair?.ply scenes/half?.ply --max-angle 0.1",
