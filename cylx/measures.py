@@ -174,15 +174,10 @@ def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
     )
 
 
-def continuation(shell: Shell, radius: float) -> tuple[float, float]:
-    """Give the density of points that go on tangentially past the ends of the arc, as a share of the arc's own.
+def continuation(shell: Shell, radius: float) -> float:
+    """Give the density of points that go on tangentially past an end of the arc, as a share of the arc's own.
 
     A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends.
-
-    Returns
-    -------
-    both, either : float
-        The lesser and the greater of the two ends.
     """
     middle = np.abs(shell.heights) <= 0.8
     on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
@@ -191,10 +186,10 @@ def continuation(shell: Shell, radius: float) -> tuple[float, float]:
         for step in (1, 2):
             closed |= np.roll(closed, 1) & np.roll(closed, -step)
     if closed.all() or not closed.any():
-        return 0.0, 0.0
+        return 0.0
     start, length = _longest_run(closed)
     if length >= SECTORS - 3:
-        return 0.0, 0.0
+        return 0.0
     width = 2.0 * math.pi / SECTORS
     counts = np.bincount(_sector(shell.angles[on]), minlength=SECTORS)
     density = max(float(counts[(start + np.arange(length)) % SECTORS].sum()) / length, 1e-9)
@@ -208,7 +203,7 @@ def continuation(shell: Shell, radius: float) -> tuple[float, float]:
         most = radius * (1.0 / np.cos(np.clip(past, 0.0, reach) + early) - 1.0) + 4.0 * shell.deviation
         along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
         shares.append(float(along.sum()) / (reach / width) / density)
-    return min(shares), max(shares)
+    return max(shares)
 
 
 def _longest_run(filled: MaskArray) -> tuple[int, int]:

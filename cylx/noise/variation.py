@@ -14,7 +14,7 @@ from cylx.noise.patches import MAD_SHRINKAGE, core_spread, half_sample_mode, qua
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-MOST = 4.0
+MOST = 8.0
 """No place is taken for this many times noisier than usual: what scatters more is no surface."""
 AGREED = 16
 """Patches that a cell needs to say something of its own noise."""

@@ -177,9 +177,7 @@ def _slice_windows(
         n = gather_ball(points, cells, starts, side, seed, reach, found)
         if n < FEWEST:
             continue
-        for a in range(n):
-            for d in range(3):
-                around[a, d] = points[found[a], d] - seed[d]
+        _copy_about(points, found, n, seed, around)
         least, greatest = max(radius_range[0], 4.0 * noise), min(radius_range[1], 0.75 * reach)
         rows[s, 7] = 0.0
         for p in range(planes + 1):
@@ -213,6 +211,14 @@ def _slice_windows(
                     rows[s, :7] = model
                     rows[s, 7], rows[s, 8] = quality[0], quality[1]
             counts[3] += 0 if fits else 1
+
+
+@njit(cache=True, nogil=True)
+def _copy_about(points: FloatArray, found: IndexArray, n: int, seed: FloatArray, around: FloatArray) -> None:
+    """Copy the points of a window, its seed at zero."""
+    for a in range(n):
+        for d in range(3):
+            around[a, d] = points[found[a], d] - seed[d]
 
 
 @njit(cache=True, nogil=True)

@@ -89,7 +89,6 @@ def verify(
     shape = shape_of(shell, segment, deviation)
     lack, structure = lack_of_fit(shell, deviation)
     inside, outside = emptiness(shell, radius)
-    both, either = continuation(shell, radius)
     consistent, near = counts
     measures = {
         "noise_ratio": deviation / noise,
@@ -98,8 +97,7 @@ def verify(
         "structure_radii": structure / radius,
         "inside": inside,
         "outside": outside,
-        "tangent": both,
-        "tangent_one": either,
+        "tangent": continuation(shell, radius),
         "curvature": shape["curvature"],
         "slope": shape["slope"],
         "slope_error": shape["slope_error"],
