@@ -347,14 +347,27 @@ def test_an_unusable_cloud_is_named(config):
 
 def test_reports_add_up(room, found, by_paper):
     for extraction, names in (
-        (found, ["curvature", "slicing", "ellipses", "candidates", "clustering", "verification", "merging"]),
+        (
+            found,
+            [
+                "curvature",
+                "slicing",
+                "ellipses",
+                "candidates",
+                "local slicing",
+                "clustering",
+                "verification",
+                "merging",
+            ],
+        ),
         (by_paper, ["slicing", "ellipses", "candidates", "clustering", "verification", "merging"]),
     ):
         stages = {stage.name: stage for stage in extraction.stages}
         assert list(stages) == names
         for name, stage in stages.items():
             assert all(count > 0 for count in stage.rejected.values())
-            if name not in {"ellipses", "clustering"}:  # those make other things of what they are given
+            # these make other things of what they are given
+            if name not in {"ellipses", "local slicing", "clustering"}:
                 assert stage.considered == stage.kept + sum(stage.rejected.values()), name
         assert stages["slicing"].kept == stages["ellipses"].considered
         assert stages["candidates"].considered == 2 * stages["ellipses"].kept

@@ -45,7 +45,7 @@ def test_nearly_all_of_many_pipes_are_found_and_nothing_else(pipes):
 def test_rounds_in_threads_give_the_same_bytes(pipes, threads):
     scene, found = pipes
     stages = {stage.name: stage for stage in found.stages}
-    assert stages["verification"].considered > 2 * ROUND
+    assert stages["verification"].considered > ROUND  # more than one round
     other = run(scene.points, threads)
     assert Result.of(other).to_json() == Result.of(found).to_json()
     assert np.array_equal(other.labels, found.labels)

@@ -158,7 +158,7 @@ def test_agreement_counts_the_windows_inside_a_cylinder():
     segment = Segment(AXES[0].copy(), 2.0, 0.01)
     assert Neighbourhood(candidates).agreement(segment) == (30, 30)
     turned = candidates.models.copy()
-    turned[np.flatnonzero(owner == 0)[:12], 6] *= 1.5
+    turned[np.flatnonzero(owner == 0)[:12], 6] *= 1.12
     assert Neighbourhood(make(turned)).agreement(segment) == (18, 30)
     assert Neighbourhood(make(np.empty((0, 7)))).agreement(segment) == (0, 0)
 

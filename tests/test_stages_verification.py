@@ -120,7 +120,7 @@ def test_sides_that_go_on_show_a_rounded_edge():
     points = np.concatenate([arc, sides])
     points += sigma * rng.standard_normal(points.shape)
     assert judge(points[:1200], sigma=sigma).measures["tangent"] < 0.05
-    assert judge(points[:2000], sigma=sigma).measures["tangent"] < 0.05  # one side may be a wall that a pipe touches
+    assert judge(points[:2000], sigma=sigma).measures["tangent"] > 0.5  # the other side may be hidden
     assert judge(points, sigma=sigma).measures["tangent"] > 0.5
 
 
