@@ -161,7 +161,10 @@ REFUSED = [
     ("slicin: {planes: 1}", "my.yaml: slicin: unknown key; did you mean 'slicing'?"),
     ("thickness: 1", "my.yaml: thickness: unknown key; did you mean 'slicing.thickness'?"),
     ("slicing.planes: 1", "my.yaml: slicing.planes: unknown key; write 'planes' below 'slicing:', indented"),
-    ("slicing: {zzz: 1}", "my.yaml: slicing.zzz: unknown key; the keys here are planes, local_planes, windows, thickness, min_points"),
+    (
+        "slicing: {zzz: 1}",
+        "my.yaml: slicing.zzz: unknown key; the keys here are planes, local_planes, windows, thickness, min_points",
+    ),
     ("slicing: {planes: 2.5}", "my.yaml: slicing.planes: 2.5 is not an integer; write digits alone"),
     ("slicing: {planes: true}", "my.yaml: slicing.planes: true is not an integer; write digits alone"),
     ("slicing: {planes: null}", "my.yaml: slicing.planes: null is not an integer; write digits alone"),

@@ -24,11 +24,11 @@ QUICK = {
     "single-paper": "single.py --preset paper --max-angle 0.4 --max-offset 0.01 --max-radius 0.5",
     "single-auto": "single.py --preset auto --max-angle 0.05 --max-offset 0.002 --max-radius 0.1",
     "single-arc": "single.py --preset auto --theta 135 --sigma 0.005 --sigma-o 0.01 --p 0.1 --max-angle 0.05",
-    "recall-coverage": "recall.py --only coverage",
-    "recall-height": "recall.py --only height",
-    "recall-points": "recall.py --only points",
-    "recall-outliers": "recall.py --only outliers",
-    "sources": "sources.py",
+    "recall-coverage": "recall.py --only coverage --trials 10",
+    "recall-height": "recall.py --only height --trials 10",
+    "recall-points": "recall.py --only points --trials 10",
+    "recall-outliers": "recall.py --only outliers --trials 10",
+    "sources": "sources.py --trials 8",
     "negatives": "negatives.py --max-found 0",
     "cans": "scenes.py scenes/five?.ply scenes/pair?.ply --min-f1 1",
     "pair": "pair.py scenes/pair?.ply scenes/half?.ply --max-angle 0.1",
@@ -37,7 +37,7 @@ QUICK = {
     "clutter": "scenes.py scenes/clutter100k_?.ply scenes/clutter300k_?.ply scenes/clutter1M_?.ply",
     "rack": "scenes.py scenes/rack1M_?.ply",
     "invariance": "invariance.py scenes/clutter300k_?.ply scenes/view0.ply scenes/rack1M_0.ply --max-offset 0.001",
-    "peers-clutter": "peers.py scenes/clutter300k_0.ply scenes/clutter1M_0.ply",
+    "peers-clutter": "peers.py scenes/clutter300k_0.ply scenes/clutter1M_0.ply --rounds 2",
     "peers-rack": "peers.py scenes/rack1M_0.ply --max-ratio 0.5",
     "startup": "startup.py",
 }
@@ -45,7 +45,6 @@ LARGE = {
     "clutter-large": "scenes.py scenes/clutter5M_?.ply",
     "rack-large": "scenes.py scenes/rack3M_?.ply",
     "growth": "growth.py scenes/rack300k_0.ply scenes/rack?M_0.ply scenes/rack10M_0.ply --max-ratio 12",
-    "peers-large": "peers.py scenes/clutter5M_0.ply scenes/rack3M_0.ply --rounds 1",
 }
 BENCHMARKS = {**QUICK, **LARGE}
 
