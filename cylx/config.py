@@ -62,9 +62,9 @@ class SlicingConfig(Section):
 
     planes: Annotated[int, Field(ge=0)] = 40
     """Number of random planes N. More planes find more cylinders and take longer."""
-    local_planes: Annotated[int, Field(ge=0)] = 3
+    local_planes: Annotated[int, Field(ge=0)] = 2
     """Planes through each window, besides one across its longest direction; 0 leaves the windows out."""
-    windows: Annotated[int, Field(ge=1)] = 400
+    windows: Annotated[int, Field(ge=1)] = 300
     """Most windows of one scale, where nothing else explains the points. More windows find more thin, sparse pipes."""
     thickness: Positive | None = None
     """Full thickness of a slice through the whole cloud, scene units. Thicker slices smear the ellipse."""

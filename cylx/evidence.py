@@ -7,8 +7,8 @@ little of each cylinder to be seen, or with noise that neighbours share; racks o
 household things before a depth camera; and rooms full of pipes and noise. `tests/benchmarks/evidence` makes the scenes
 and fits the weights. No term may speak against its own meaning: the signs are fixed before the fit.
 
-What is not fitted are the terms themselves: `FORM`, `FORM_NOISES`, the limits in the terms, and that height counts as far
-as candidates disagree. About thirty variants were compared, by cross-validation and with the scenes of
+What is not fitted are the terms themselves: `FORM`, `FORM_NOISES`, the limits in the terms, and that height counts as
+far as candidates disagree. About thirty variants were compared, by cross-validation and with the scenes of
 `docs/benchmarks.md` in view. Fits near a true cylinder that were neither clearly it nor clearly another were left out.
 """
 

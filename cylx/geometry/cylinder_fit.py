@@ -26,6 +26,8 @@ TUKEY_SPREAD = 1.0989
 
 
 POLISH_STEPS = 10
+SOME, LAST_STEPS = 150, 3
+"""Points that suffice for the first steps of a polish, and steps with all of them."""
 SHARP = 0.34
 """Largest spread of a polished candidate over its kernel: a Gaussian within it has 0.27 of the width, a uniform
 background 0.378."""
@@ -68,15 +70,19 @@ def _accumulate(
     frame: FloatArray,
     row: FloatArray,
     sums: FloatArray,
+    stride: int,
 ) -> None:
-    """Fill the weighted normal equations of a step; `sums` gets the weights, the squares and the largest height."""
+    """Fill the weighted normal equations of a step from every so manyth point.
+
+    `sums` gets the weights, the squares and the largest height.
+    """
     fill_frame(model[3:6], frame)
     for a in range(5):
         right[a] = 0.0
         for b in range(5):
             normal[a, b] = 0.0
     weights, squares, reach = 0.0, 0.0, 0.0
-    for i in range(n):
+    for i in range(0, n, stride):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
         z = dx * model[3] + dy * model[4] + dz * model[5]
         if z < low or z > high:
@@ -138,8 +144,8 @@ def fit_in_place(
 ) -> float:
     """Fit `model` = (point, direction, radius), shape (7,), to points[:n] whose height lies in [low, high].
 
-    Heights are measured from the model's point along its direction. `schedule` (6,) has what a `Kernel` has, and the
-    most steps. `normal` (5, 5), `right` (5,) and `frame` (2, 3)
+    Heights are measured from the model's point along its direction. `schedule` (7,) has what a `Kernel` has, the
+    most steps, and that every so manyth point takes part. `normal` (5, 5), `right` (5,) and `frame` (2, 3)
     are scratch.
 
     Returns
@@ -150,8 +156,9 @@ def fit_in_place(
     width, floor, decay, tuning, tolerance = schedule[0], schedule[1], schedule[2], schedule[3], schedule[4]
     spread = width / 3.0
     row, sums = np.empty(5), np.empty(3)
+    stride = int(schedule[6])
     for _ in range(int(schedule[5])):
-        _accumulate(points, n, model, low, high, width, normal, right, frame, row, sums)
+        _accumulate(points, n, model, low, high, width, normal, right, frame, row, sums, stride)
         if sums[0] < 8.0 or not solve_in_place(normal, right):
             return -1.0
         spread = math.sqrt(sums[1] / sums[0])
@@ -193,7 +200,7 @@ def fit_cylinder(
     """
     fitted = np.array(model, dtype=np.float64)
     scratch = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    schedule = np.array([*kernel, steps], dtype=np.float64)
+    schedule = np.array([*kernel, steps, 1.0], dtype=np.float64)
     spread = fit_in_place(np.ascontiguousarray(points), len(points), fitted, low, high, schedule, *scratch)
     return None if spread < 0 else (fitted, float(spread))
 
@@ -216,7 +223,7 @@ def candidate_quality(
     """Fill `quality` (4,) with what supports a cylinder among points[:n].
 
     The inliers (within `width` of the surface), the extent of their heights, the share of the angular `bins` that they
-    fill, and the number of points further in.
+    fill (0 if there are no bins), and the number of points further in.
     """
     fill_frame(model[3:6], frame)
     for a in range(len(bins)):
@@ -230,7 +237,8 @@ def candidate_quality(
         if abs(residual) < width:
             z = dx * model[3] + dy * model[4] + dz * model[5]
             lowest, highest = min(lowest, z), max(highest, z)
-            bins[int((math.atan2(y, x) / (2.0 * math.pi) + 0.5) * len(bins)) % len(bins)] += 1
+            if len(bins) > 0:
+                bins[int((math.atan2(y, x) / (2.0 * math.pi) + 0.5) * len(bins)) % len(bins)] += 1
             count += 1
         elif residual < 0.0:
             inside += 1
@@ -238,7 +246,7 @@ def candidate_quality(
     for a in range(len(bins)):
         filled += 1 if bins[a] > 0 else 0
     quality[0], quality[1] = count, highest - lowest if count else 0.0
-    quality[2], quality[3] = filled / len(bins), inside
+    quality[2], quality[3] = filled / max(len(bins), 1), inside
 
 
 @njit(cache=True, nogil=True)
@@ -276,11 +284,15 @@ def polish(
         2 if it does, 1 if it is badly supported, 0 if it does not fit.
     """
     matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    bins, schedule = np.empty(36, np.int64), np.empty(6)
+    bins, schedule = np.empty(0, np.int64), np.empty(7)
     floor = max(3.0 * noise, 0.01 * model[6])
     schedule[0], schedule[1], schedule[2] = max(0.3 * model[6], 4.0 * noise), floor, 0.6
     schedule[3], schedule[4], schedule[5] = math.inf, 1e-2, POLISH_STEPS
+    schedule[6] = max(1, n // SOME)
     spread = fit_in_place(points, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
+    if schedule[6] > 1 and 0.0 <= spread <= 1.2 * SHARP * floor:  # some of the points brought it near, all decide
+        schedule[0], schedule[5], schedule[6] = floor, LAST_STEPS, 1
+        spread = fit_in_place(points, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
     if spread < 0.0 or spread > SHARP * floor or not (least <= model[6] <= greatest):
         return 0
     candidate_quality(points, n, model, 3.0 * noise, frame, bins, quality)

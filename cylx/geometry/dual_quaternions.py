@@ -161,7 +161,7 @@ def pairwise_screw_distances(points: FloatArray, directions: FloatArray) -> tupl
     return 0.5 * (distances + distances.T), 0.5 * (gaps + gaps.T)
 
 
-def blend(motions: FloatArray, weights: FloatArray, max_iterations: int = 20, tolerance: float = 1e-12) -> FloatArray:
+def blend(motions: FloatArray, weights: FloatArray, max_iterations: int = 20, tolerance: float = 1e-9) -> FloatArray:
     """Average motions by dual-quaternion iterative blending (step 3 of section 3.4).
 
     Parameters

@@ -158,6 +158,52 @@ def cell_starts(codes: IndexArray, level: int) -> tuple[IndexArray, IndexArray]:
     return keys[first], np.concatenate((first, [len(codes)])).astype(np.int64)
 
 
+def group(codes: IndexArray, level: int, keep: NDArray[np.bool_]) -> tuple[IndexArray, IndexArray, IndexArray]:
+    """Give the points to keep, the occupied cells of one level, and where each one's run of these points begins.
+
+    Parameters
+    ----------
+    codes : ndarray of shape (N,), sorted
+    level : int
+        Cells have the side `unit * 2^level`.
+    keep : ndarray of shape (N,), bool
+
+    Returns
+    -------
+    members : ndarray of shape (n,)
+        Indices of the points to keep, ascending.
+    cells : ndarray of shape (C,)
+    starts : ndarray of shape (C + 1,)
+        Members `starts[c]:starts[c + 1]` lie in cell c.
+    """
+    members = np.empty(np.count_nonzero(keep), np.int64)
+    cells, starts = np.empty(len(members), np.int64), np.empty(len(members) + 1, np.int64)
+    count = _group(codes, 3 * level, keep, members, cells, starts)
+    return members, cells[:count].copy(), starts[: count + 1].copy()
+
+
+@njit(cache=True, nogil=True)
+def _group(
+    codes: IndexArray,
+    shift: int,
+    keep: NDArray[np.bool_],
+    members: IndexArray,
+    cells: IndexArray,
+    starts: IndexArray,
+) -> int:
+    n, count = 0, 0
+    for i in range(len(codes)):
+        if keep[i]:
+            cell = codes[i] >> shift
+            if count == 0 or cells[count - 1] != cell:
+                cells[count], starts[count] = cell, n
+                count += 1
+            members[n] = i
+            n += 1
+    starts[count] = n
+    return count
+
+
 def thin(codes: IndexArray, level: int, keep: NDArray[np.bool_] | None = None) -> IndexArray:
     """Pick one point of each occupied cell, pseudo-randomly by the cell's code.
 

@@ -6,11 +6,12 @@ one. All records are frozen: a stage makes new ones and never changes those it w
 
 from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source, cell_keys
 from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
-from cylx.records.octaves import Explained, Octave
+from cylx.records.octaves import CELL, Explained, Octave
 from cylx.records.outcomes import CylinderFit, Extraction, Finding, Refusal, Rejection, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
 
 __all__ = [
+    "CELL",
     "Candidates",
     "Cluster",
     "CylinderFit",

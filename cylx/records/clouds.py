@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
+from cylx.geometry.sorting import sort_in_place
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -277,14 +279,9 @@ class Ground:
         """
         radius = float(model[6])
         usual = self.noise.at(2.0 * radius)
-        patches = self.noise.patches[self.noise.patches[:, 3] < radius / SMALL_PATCH]
-        offsets = patches[:, :3] - model[:3]
-        heights = offsets @ model[3:6]
-        distances = np.sqrt(np.maximum((offsets * offsets).sum(axis=1) - heights * heights, 0.0))
-        on = (np.abs(heights) < half) & (np.abs(distances - radius) < np.maximum(0.1 * radius, 4.0 * usual))
-        if on.sum() < ENOUGH_PATCHES:
+        own, count = _noise_on(self.noise.patches, model, half, max(0.1 * radius, 4.0 * usual))
+        if count < ENOUGH_PATCHES:
             return usual * max(1.0, float(self.noise.factors_at(model[None, :3])[0]))
-        own = float(np.median(patches[on, 4]))
         return usual * min(own, MOST_NOISE) if own > 1.2 else usual
 
     def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
@@ -294,3 +291,24 @@ class Ground:
     def too_flat(self, radius: float) -> float:
         """Give the flatness from which a point belongs to something flatter than a cylinder of this radius."""
         return 2.0 * radius
+
+
+@njit(cache=True, nogil=True)
+def _noise_on(patches: FloatArray, model: FloatArray, half: float, width: float) -> tuple[float, int]:
+    """Give the median noise of the patches on a cylinder's surface that are small against it, and their number."""
+    values, n = np.empty(len(patches)), np.int64(0)
+    for i in range(len(patches)):
+        if patches[i, 3] * SMALL_PATCH >= model[6]:
+            continue
+        dx, dy, dz = patches[i, 0] - model[0], patches[i, 1] - model[1], patches[i, 2] - model[2]
+        height = dx * model[3] + dy * model[4] + dz * model[5]
+        if abs(height) >= half:
+            continue
+        distance = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height))
+        if abs(distance - model[6]) < width:
+            values[n] = patches[i, 4]
+            n += 1
+    if n == 0:
+        return 1.0, 0
+    sort_in_place(values, n)
+    return float(0.5 * (values[(n - 1) // 2] + values[n // 2])), n

@@ -8,12 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.morton import cell_starts, pick_one
+from cylx.geometry.morton import cell_starts, group, pick_one
 from cylx.records.clouds import Frame
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 MaskArray = NDArray[np.bool_]
+
+
+CELL = 4
+"""Levels from a voxel to the cells that windows gather points from: to look a cell up takes as long as many points."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +37,7 @@ class Octave:
     indices : ndarray of shape (n,)
         Which points of the frame they are.
     cells, starts, side
-        Cells of eight voxels' width for `gather_ball`.
+        Cells of sixteen voxels' width for `gather_ball`.
     members : ndarray of shape (m,)
         The points of the frame that were thinned, ascending.
     runs : ndarray of shape (n + 1,)
@@ -55,12 +59,11 @@ class Octave:
     def of(cls, frame: Frame, radius: float, keep: MaskArray) -> Octave:
         """Thin the points to keep of a frame for windows of a radius."""
         level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window)))
-        members = np.flatnonzero(keep)
-        voxels, runs = cell_starts(frame.codes[members], level)
+        members, voxels, runs = group(frame.codes, level, keep)
         indices = members[pick_one(voxels, runs)]
         codes = frame.codes[indices]
-        cells, starts = cell_starts(codes, level + 3)
-        side = frame.unit * 2.0 ** (level + 3)
+        cells, starts = cell_starts(codes, level + CELL)
+        side = frame.unit * 2.0 ** (level + CELL)
         return cls(radius, level, frame.points[indices], codes, indices, cells, starts, side, members, runs)
 
     def seeds(self, enough: int, keep: MaskArray | None = None, least: int = 1) -> IndexArray:

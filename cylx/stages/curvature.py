@@ -19,7 +19,7 @@ from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
 from cylx.geometry.small_matrices import fill_frame
-from cylx.records import Candidates, Explained, Frame, Octave, StageReport
+from cylx.records import CELL, Candidates, Explained, Frame, Octave, StageReport
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -229,7 +229,7 @@ def _mark_explained(
 
 def _mark_flat(frame: Frame, octave: Octave, seeds: IndexArray, planes: FloatArray, flatness: FloatArray) -> None:
     """Give the points about flat windows, within three noises of their planes, the radius of the window."""
-    cells, starts = cell_starts(frame.codes, octave.level + 3)
+    cells, starts = cell_starts(frame.codes, octave.level + CELL)
     places = octave.points[seeds]
     widths = 3.0 * frame.noise.about(places, 2.0 * octave.radius)
     _mark(frame.points, cells, starts, octave.side, places, planes, 2.0 * octave.radius, widths, flatness)
