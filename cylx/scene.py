@@ -147,7 +147,7 @@ def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexAr
     corner, side = cell_cube(points)
     offsets = points - corner
     unit = side / (2**BITS - 2)
-    codes = morton_codes(np.clip(offsets, 0.0, side), unit)
+    codes = morton_codes(offsets, unit, side)
     order = np.argsort(codes)
     return offsets[order], order, codes[order], unit
 
@@ -207,7 +207,7 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
     ordered, side = (points[order] - corner) / spacing, side / spacing
     level = max(0, min(BITS - 1, math.floor(math.log2(2.0**BITS * voxel / (side + voxel)))))
     unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # of a cloud wider than 2^21 voxels they are coarser
-    codes = morton_codes(np.clip(ordered, 0.0, side), unit)
+    codes = morton_codes(ordered, unit, side)
     again = np.argsort(codes, kind="stable")
     places, ratios = ordered[patches.middles], patches.deviations / measured
     cell, cells, factors = noise_by_place(places, ratios, side)

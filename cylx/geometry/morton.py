@@ -6,6 +6,8 @@ sort gives voxels and cells of all octaves, and an order of the points that does
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -31,13 +33,15 @@ def interleave(value: int) -> int:
 
 
 @njit(cache=True, nogil=True)
-def _fill_codes(points: FloatArray, unit: float, codes: IndexArray) -> None:
+def _fill_codes(points: FloatArray, unit: float, most: float, codes: IndexArray) -> None:
     for i in range(len(points)):
-        x, y, z = int(points[i, 0] / unit), int(points[i, 1] / unit), int(points[i, 2] / unit)
+        x = int(min(max(points[i, 0], 0.0), most) / unit)
+        y = int(min(max(points[i, 1], 0.0), most) / unit)
+        z = int(min(max(points[i, 2], 0.0), most) / unit)
         codes[i] = (interleave(x) << 2) | (interleave(y) << 1) | interleave(z)
 
 
-def morton_codes(points: FloatArray, unit: float) -> IndexArray:
+def morton_codes(points: FloatArray, unit: float, most: float | None = None) -> IndexArray:
     """Give the Morton code of each point's cell.
 
     Parameters
@@ -46,6 +50,8 @@ def morton_codes(points: FloatArray, unit: float) -> IndexArray:
         Coordinates in [0, 2^21 unit).
     unit : float
         Side of the smallest cell.
+    most : float, optional
+        Coordinates below zero or above this are taken for these.
 
     Returns
     -------
@@ -57,10 +63,10 @@ def morton_codes(points: FloatArray, unit: float) -> IndexArray:
     ValueError
         If a point lies outside the cube the codes can tell apart.
     """
-    if len(points) and not (points.min() >= 0 and points.max() < unit * 2**BITS):
+    if most is None and len(points) and not (points.min() >= 0 and points.max() < unit * 2**BITS):
         raise ValueError("coordinates must lie in [0, 2^21 unit)")
     codes = np.empty(len(points), np.int64)
-    _fill_codes(points, unit, codes)
+    _fill_codes(points, unit, math.inf if most is None else most, codes)
     return codes
 
 

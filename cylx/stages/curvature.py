@@ -33,7 +33,7 @@ FLAT_SHARE = 0.9
 """Share of a window's points within three noises of its plane that makes it flat."""
 OUTCOMES = ("too few points", "flat", "no curvature", "does not fit", "badly supported", "kept")
 LEAST_POINTS = 25
-LONELY = 3
+LONELY = 4
 """No window is laid about points that have fewer than this in their cell: most of them are noise."""
 COLUMNS = 9
 """Numbers a window fills in: the model (7), inliers, extent."""
