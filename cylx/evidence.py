@@ -70,23 +70,23 @@ def _stubbiness(measures: Mapping[str, float]) -> float:
     return math.log(min(max(measures["height_radii"], 0.1), 4.0) / 4.0) * (1.0 - measures["agreement"])
 
 
-BIAS = -5.372
+BIAS = -4.742
 TERMS = (
-    Term("noise", -6.025, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    Term("noise", -6.116, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
     # other points inside, just outside, and going on past an end of the arc
-    Term("inside", -0.280, 0.10, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -0.416, 0.39, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
-    Term("tangent", -4.009, 0.07, lambda m: min(m["tangent"], 1.5)),
+    Term("inside", -0.266, 0.10, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -0.429, 0.39, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
+    Term("tangent", -4.542, 0.04, lambda m: min(m["tangent"], 1.5)),
     # how much of a cylinder is there at all
-    Term("coverage", 1.436, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
-    Term("too few points", 0.269, 2.68, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
-    Term("height", 4.806, -0.01, _stubbiness),
+    Term("coverage", 0.508, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
+    Term("too few points", 0.310, 2.68, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
+    Term("height", 4.534, -0.01, _stubbiness),
     # what the candidates say
-    Term("payoff", 4.568, 0.83, lambda m: m["payoff"]),
-    Term("agreement", 5.667, 0.87, lambda m: m["agreement"]),
+    Term("payoff", 4.551, 0.83, lambda m: m["payoff"]),
+    Term("agreement", 5.746, 0.87, lambda m: m["agreement"]),
     # cones; and whatever is too short to be told from a sphere
-    Term("slope", -23.332, 0.00, _slope),
-    Term("bulge unknown", -44.998, 0.00, lambda m: min(m["bulge_error"], 1.0)),
+    Term("slope", -23.083, 0.00, _slope),
+    Term("bulge unknown", -41.629, 0.00, lambda m: min(m["bulge_error"], 1.0)),
 )
 
 

@@ -177,7 +177,8 @@ def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
 def continuation(shell: Shell, radius: float) -> float:
     """Give the density of points that go on tangentially past an end of the arc, as a share of the arc's own.
 
-    A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends.
+    A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends. Of arcs of more
+    than half a turn, that is the lesser of the two.
     """
     middle = np.abs(shell.heights) <= 0.8
     on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
@@ -201,9 +202,12 @@ def continuation(shell: Shell, radius: float) -> float:
         past = (sign * (shell.angles - end) + math.pi) % (2.0 * math.pi) - math.pi
         least = radius * (1.0 / np.cos(np.clip(past, 0.0, reach)) - 1.0) - 4.0 * shell.deviation
         most = radius * (1.0 / np.cos(np.clip(past, 0.0, reach) + early) - 1.0) + 4.0 * shell.deviation
+        # what is within three deviations is the surface itself, seen less often there
+        least = np.maximum(least, 3.0 * shell.deviation)
         along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
         shares.append(float(along.sum()) / (reach / width) / density)
-    return max(shares)
+    # an edge turns by less than half a turn; of more, both ends would have to go on
+    return max(shares) if closed.sum() <= SECTORS // 2 else min(shares)
 
 
 def _longest_run(filled: MaskArray) -> tuple[int, int]:
