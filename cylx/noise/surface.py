@@ -104,6 +104,8 @@ def measure_surface(
         plain, robust = half_sample_mode(spread[good]), half_sample_mode(cores + 1e-12 * typical)
         # heavy outliers blow up the plain estimate alone
         noise = max(noise, robust / MAD_SHRINKAGE if robust < 0.85 * MAD_SHRINKAGE * plain else plain)
+        # the scatter of a patch has its outliers; what it says of its place is how it compares with that of others
+        spread = spread * (noise / plain)
     return float(typical), float(dense), float(noise), Patches(sample[clear], spread[clear], size_of[clear])
 
 
