@@ -218,6 +218,14 @@ def test_gaps_of_up_to_three_radii_are_bridged(gap, bridged):
     assert np.isclose(high, 6 + gap if bridged else 2.0, atol=0.1)
 
 
+def test_something_that_passes_by_beyond_an_end_does_not_lengthen_it():
+    rng = np.random.default_rng(4)
+    own, ring = surface(rng, -1, 1, 3000), surface(rng, 2.3, 2.4, 50)  # all round, within the gap that is bridged
+    heights, angles = (np.concatenate(pair) for pair in zip(own, ring, strict=True))
+    _, high = visible_extent(heights, angles, 1.0, 1.0)
+    assert np.isclose(high, 1.0, atol=0.02)
+
+
 def test_a_few_points_have_no_extent():
     heights, angles = surface(np.random.default_rng(3), -1, 1, 14)
     assert visible_extent(heights, angles, 1.0, 1.0) is None

@@ -212,41 +212,23 @@ def unbiased_radius(radius: float, spread: float) -> float:
 
 @njit(cache=True, nogil=True)
 def candidate_quality(
-    points: FloatArray,
-    n: int,
-    model: FloatArray,
-    width: float,
-    frame: FloatArray,
-    bins: NDArray[np.int64],
-    quality: FloatArray,
+    points: FloatArray, n: int, model: FloatArray, width: float, frame: FloatArray, quality: FloatArray
 ) -> None:
-    """Fill `quality` (4,) with what supports a cylinder among points[:n].
+    """Fill the first two of `quality` with what supports a cylinder among points[:n].
 
-    The inliers (within `width` of the surface), the extent of their heights, the share of the angular `bins` that they
-    fill (0 if there are no bins), and the number of points further in.
+    The inliers (within `width` of the surface), and the extent of their heights.
     """
     fill_frame(model[3:6], frame)
-    for a in range(len(bins)):
-        bins[a] = 0
-    lowest, highest, count, inside = math.inf, -math.inf, 0, 0
+    lowest, highest, count = math.inf, -math.inf, 0
     for i in range(n):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
         x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
         y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-        residual = math.sqrt(x * x + y * y) - model[6]
-        if abs(residual) < width:
+        if abs(math.sqrt(x * x + y * y) - model[6]) < width:
             z = dx * model[3] + dy * model[4] + dz * model[5]
             lowest, highest = min(lowest, z), max(highest, z)
-            if len(bins) > 0:
-                bins[int((math.atan2(y, x) / (2.0 * math.pi) + 0.5) * len(bins)) % len(bins)] += 1
             count += 1
-        elif residual < 0.0:
-            inside += 1
-    filled = 0
-    for a in range(len(bins)):
-        filled += 1 if bins[a] > 0 else 0
     quality[0], quality[1] = count, highest - lowest if count else 0.0
-    quality[2], quality[3] = filled / max(len(bins), 1), inside
 
 
 @njit(cache=True, nogil=True)
@@ -275,7 +257,7 @@ def polish(
         Radius it may have.
     min_inliers, min_share, min_extent
         What must support it: points, their share of all, and the length along the axis.
-    quality : ndarray of shape (5,)
+    quality : ndarray of shape (3,)
         Filled by `candidate_quality`, and with the spread.
 
     Returns
@@ -284,7 +266,7 @@ def polish(
         2 if it does, 1 if it is badly supported, 0 if it does not fit.
     """
     matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    bins, schedule = np.empty(0, np.int64), np.empty(7)
+    schedule = np.empty(7)
     floor = max(3.0 * noise, 0.01 * model[6])
     schedule[0], schedule[1], schedule[2] = max(0.3 * model[6], 4.0 * noise), floor, 0.6
     schedule[3], schedule[4], schedule[5] = math.inf, 1e-2, POLISH_STEPS
@@ -295,8 +277,8 @@ def polish(
         spread = fit_in_place(points, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
     if spread < 0.0 or spread > SHARP * floor or not (least <= model[6] <= greatest):
         return 0
-    candidate_quality(points, n, model, 3.0 * noise, frame, bins, quality)
-    quality[4] = spread
+    candidate_quality(points, n, model, 3.0 * noise, frame, quality)
+    quality[2] = spread
     supported = quality[0] >= min_inliers and quality[0] >= min_share * n and quality[1] >= min_extent
     return 2 if supported else 1
 

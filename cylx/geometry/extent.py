@@ -17,6 +17,8 @@ IndexArray = NDArray[np.int64]
 ARC_BINS = 24
 LEAST = 15
 """Points without which an extent cannot be told."""
+FAINT = 0.2
+"""A piece with less than this share of what one of the known part holds on average shows something that passes by."""
 FULL_PIECE = 12.0
 """Points a piece of the height should hold."""
 LONE = 6.0
@@ -129,7 +131,7 @@ def _find_ends(
     piece = max(0.25 * radius, FULL_PIECE / density)
     first = math.floor(lowest / piece)
     pieces = int(math.floor(highest / piece) - first) + 1
-    shares = _fill_shares(heights, angles, arc, width, piece, first, pieces)
+    shares = _fill_shares(heights, angles, arc, width, piece, first, pieces, density * piece)
     start, stop = _choose_run(shares, pieces, piece, first, half, filled, max(3.0 * radius, FULL_PIECE / density))
     if start < 0:
         return False
@@ -144,18 +146,29 @@ def _bin(angle: float) -> int:
 
 @njit(cache=True, nogil=True)
 def _fill_shares(
-    heights: FloatArray, angles: FloatArray, arc: NDArray[np.bool_], width: int, piece: float, first: float, pieces: int
+    heights: FloatArray,
+    angles: FloatArray,
+    arc: NDArray[np.bool_],
+    width: int,
+    piece: float,
+    first: float,
+    pieces: int,
+    usual: float,
 ) -> FloatArray:
-    """Give the share of the arc's bins that hold a point, for each piece of the height."""
+    """Give the share of the arc's bins that hold a point, for each piece of the height; 0 for faint ones."""
     occupied = np.zeros((pieces, ARC_BINS), np.bool_)
-    shares = np.zeros(pieces)
+    shares, counts = np.zeros(pieces), np.zeros(pieces)
     for i in range(len(heights)):
         b = _bin(angles[i])
         if arc[b]:
             p = int(math.floor(heights[i] / piece) - first)
+            counts[p] += 1.0
             if not occupied[p, b]:
                 occupied[p, b] = True
                 shares[p] += 1.0 / width
+    for p in range(pieces):
+        if counts[p] < FAINT * usual:
+            shares[p] = 0.0
     return shares
 
 

@@ -99,6 +99,12 @@ class Candidates:
         )
 
     @classmethod
+    def of_windows(cls, rows: FloatArray, radius: float) -> Candidates:
+        """Make candidates of windows of one radius, each a parent of its own: rows (M, 9) of model, inliers, extent."""
+        inliers = rows[:, 7].astype(np.int64)
+        return cls(rows[:, :7].copy(), np.arange(len(rows)), rows[:, 8].copy(), inliers, np.full(len(rows), radius))
+
+    @classmethod
     def joined(cls, parts: Sequence[Candidates]) -> Candidates:
         """Put several sets behind one another; parents are renumbered so that they stay apart."""
         if not parts:

@@ -127,7 +127,7 @@ def _polish(
     kept: NDArray[np.bool_],
 ) -> None:
     found, around = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3))
-    quality, center = np.empty(5), np.empty(3)
+    quality, center = np.empty(3), np.empty(3)
     for c in range(len(rows)):
         model = rows[c, :7]
         first = model[6]

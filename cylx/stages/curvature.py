@@ -74,16 +74,7 @@ def find_curved_windows(
         flat = outcome == 1
         if flat.any():
             _mark_flat(frame, octave, seeds[flat], planes[flat], explained.flatness)
-        good = rows[outcome == 5]
-        parts.append(
-            Candidates(
-                good[:, :7].copy(),
-                np.arange(len(good)),
-                good[:, 8].copy(),
-                good[:, 7].astype(np.int64),
-                np.full(len(good), radius),
-            )
-        )
+        parts.append(Candidates.of_windows(rows[outcome == 5], radius))
     found = Candidates.joined(parts)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:5], counts[:5], strict=True) if n}
     return found, explained, StageReport("curvature", int(counts.sum()), len(found), rejected)
@@ -153,7 +144,7 @@ def _scan(
     plane, heights = np.empty((2, 3)), np.empty(CAPACITY)
     matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
     right, axes = np.empty(6), np.empty((2, 3))
-    quality = np.empty(5)
+    quality = np.empty(3)
     for s in range(len(seeds)):
         seed, model, noise = points[seeds[s]], rows[s, :7], noises[s]
         n = gather_ball(points, cells, starts, side, seed, 2.0 * radius, found)

@@ -86,16 +86,7 @@ def slice_windows(
             frame, octave, seeds[::stride], radius_range, config.local_planes, supported, seed, threads
         )
         totals += counts
-        good = rows[rows[:, 7] > 0]
-        parts.append(
-            Candidates(
-                good[:, :7].copy(),
-                np.arange(len(good)),
-                good[:, 8].copy(),
-                good[:, 7].astype(np.int64),
-                np.full(len(good), radius),
-            )
-        )
+        parts.append(Candidates.of_windows(rows[rows[:, 7] > 0], radius))
     return Candidates.joined(parts), dict(zip(COUNTS, totals.tolist(), strict=True))
 
 
@@ -169,7 +160,7 @@ def _slice_windows(
     found, around, alone = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
     flat, samples = np.empty((CAPACITY, 2)), np.empty((SAMPLES, 5), np.int64)
     model, normal, frame = np.empty(7), np.empty(3), np.empty((2, 3))
-    shape, quality = np.empty(5), np.empty(5)
+    shape, quality = np.empty(5), np.empty(3)
     for s in range(len(seeds)):
         seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1
         for _ in range(4):
