@@ -70,23 +70,24 @@ def _stubbiness(measures: Mapping[str, float]) -> float:
     return math.log(min(max(measures["height_radii"], 0.1), 4.0) / 4.0) * (1.0 - measures["agreement"])
 
 
-BIAS = -4.742
+BIAS = -4.709
 TERMS = (
-    Term("noise", -6.116, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    Term("noise", -5.717, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
     # other points inside, just outside, and going on past an end of the arc
-    Term("inside", -0.266, 0.10, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -0.429, 0.39, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
-    Term("tangent", -4.542, 0.04, lambda m: min(m["tangent"], 1.5)),
+    Term("inside", -0.415, 0.10, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -0.388, 0.47, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
+    Term("tangent", -4.423, 0.02, lambda m: min(m["tangent"], 1.5)),
     # how much of a cylinder is there at all
-    Term("coverage", 0.508, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
-    Term("too few points", 0.310, 2.68, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
-    Term("height", 4.534, -0.01, _stubbiness),
+    Term("coverage", 0.834, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
+    Term("too few points", 0.277, 2.71, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
+    Term("height", 4.295, -0.01, _stubbiness),
+    Term("few lines", 5.029, 0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
     # what the candidates say
-    Term("payoff", 4.551, 0.83, lambda m: m["payoff"]),
-    Term("agreement", 5.746, 0.87, lambda m: m["agreement"]),
+    Term("payoff", 4.045, 0.82, lambda m: m["payoff"]),
+    Term("agreement", 5.764, 0.87, lambda m: m["agreement"]),
     # cones; and whatever is too short to be told from a sphere
-    Term("slope", -23.083, 0.00, _slope),
-    Term("bulge unknown", -41.629, 0.00, lambda m: min(m["bulge_error"], 1.0)),
+    Term("slope", -18.840, 0.00, _slope),
+    Term("bulge unknown", -45.181, 0.00, lambda m: min(m["bulge_error"], 1.0)),
 )
 
 
@@ -108,7 +109,7 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     Examples
     --------
     >>> pipe = dict(noise_ratio=1.0, structure=0.0, structure_radii=0.0, inside=0.0, outside=0.0, tangent=0.0,
-    ...             coverage=6.0, inliers=2000.0, height_radii=9.0, payoff=0.8, agreement=0.95, slope=0.0,
+    ...             coverage=6.0, inliers=2000.0, places=12.0, height_radii=9.0, payoff=0.8, agreement=0.95, slope=0.0,
     ...             slope_error=0.001, bulge_error=0.01)
     >>> weigh(pipe)[0] > 0.99
     True

@@ -388,7 +388,7 @@ def synthetic_line(rng, index):
     measures = {name: float(0.1 * rng.random()) for name in names.split()}
     true = bool(rng.random() < 0.4)
     measures |= {"height_radii": float(5 * rng.random()), "agreement": float(0.4 * true + 0.5 * rng.random())}
-    measures |= {"curvature": 9.0, "windows": 5.0, "coverage": 3.0, "inliers": 300.0, "payoff": 0.7}
+    measures |= {"curvature": 9.0, "windows": 5.0, "places": 12.0, "coverage": 3.0, "inliers": 300.0, "payoff": 0.7}
     return {
         "scene": f"s{index % 20}",
         "label": labels.TRUE if true else labels.FALSE,

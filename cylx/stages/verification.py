@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cylx.config import VerificationConfig
 from cylx.evidence import weigh
-from cylx.measures import TRUNCATED, continuation, covered_angle, emptiness, lack_of_fit, look_at, shape_of
+from cylx.measures import TRUNCATED, continuation, covered_angle, distinct_places, emptiness, lack_of_fit, look_at, shape_of
 from cylx.records import Ground, Segment
 
 LEAST = 20
@@ -98,6 +98,7 @@ def verify(
         "inside": inside,
         "outside": outside,
         "tangent": continuation(shell, radius),
+        "places": distinct_places(shell.angles[shell.on], radius, deviation),
         "curvature": shape["curvature"],
         "slope": shape["slope"],
         "slope_error": shape["slope_error"],

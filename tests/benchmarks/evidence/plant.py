@@ -61,11 +61,11 @@ def plant(rng, kind, seed, points=None):
 
 
 def seen_by_scanners(rng, sketch, size, count):
-    """Choose what four scanners see; in half of the scenes noise grows with the range."""
+    """Choose what four scanners see, in half of the scenes in lines; in half of them noise grows with the range."""
     far = size + 2 * MARGIN + 1.5
     corners = np.array([[0.5, -1.5, 1.7], [far, -1.5, 1.7], [0.5, far, 1.7], [far, far, 1.7]])
     views = corners + rng.uniform(-0.4, 0.4, (4, 3))
-    draft, ranges = scanned(rng, sketch, views, bin_width=BIN, dense=DENSE, count=count)
+    draft, ranges = scanned(rng, sketch, views, bin_width=BIN, dense=DENSE, count=count, lines=rng.random() < 0.5)
     return draft._replace(blur=ranges / np.median(ranges)) if rng.random() < 0.5 else draft
 
 
