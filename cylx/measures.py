@@ -26,6 +26,8 @@ PLACES = 12.0
 """More places than these about an axis tell no more."""
 GAP = 4.0
 """A gap this much wider than is to be expected by chance is none by chance."""
+SPARSE = 0.2
+"""Where there is less than this share of the usual density, points lie between lines."""
 LINE_SHARE = 0.1
 """Fewer points than this share are not a line but strays."""
 
@@ -128,7 +130,9 @@ def distinct_places(angles: FloatArray, radius: float, deviation: float) -> floa
     gaps = np.diff(np.append(ordered, ordered[0] + 2.0 * math.pi))
     first = int(np.argmax(gaps)) + 1
     ordered = np.concatenate([ordered[first:], ordered[:first] + 2.0 * math.pi])
+    ordered = ordered[_dense(ordered, 1.5 * deviation / radius)]
     # the widest gap to be expected of so many points at random is log(n) / n of the arc
+    count = len(ordered)
     widest = GAP * (ordered[-1] - ordered[0]) * math.log(count) / count
     cuts = np.flatnonzero(np.diff(ordered) > max(widest, 3.0 * deviation / radius)) + 1
     lines = [line for line in np.split(ordered, cuts) if len(line) >= LINE_SHARE * count]
@@ -139,6 +143,13 @@ def distinct_places(angles: FloatArray, radius: float, deviation: float) -> floa
         width = (line[-1 - len(line) // 20] - line[len(line) // 20]) * radius
         places += 1.0 + min(PLACES, width / max(6.0 * deviation, 1e-300))
     return min(places, PLACES)
+
+
+def _dense(ordered: FloatArray, reach: float) -> MaskArray:
+    """Tell which of sorted angles have so many others within reach that they do not lie between lines."""
+    near = np.searchsorted(ordered, ordered + reach, "right") - np.searchsorted(ordered, ordered - reach)
+    usual = 2.0 * reach * len(ordered) / max(float(ordered[-1] - ordered[0]), 2.0 * reach)
+    return np.asarray(near >= SPARSE * usual, dtype=np.bool_)
 
 
 def shape_of(shell: Shell, segment: Segment, deviation: float) -> dict[str, float]:

@@ -16,7 +16,7 @@ from cylx.pipeline.sources import (
     windows_and_explained,
 )
 from cylx.pipeline.turns import Turns
-from cylx.pipeline.warmup import kernels_are_cold, practice_cloud
+from cylx.pipeline.warmup import kernels_are_cold, practice_cloud, second_process
 from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
 from cylx.scene import check_usable, make_frame, radius_range, resolve
 from cylx.stages.clustering import CandidateGame, thin_candidates
@@ -52,7 +52,7 @@ def extract_cylinders(
     threads = threads or os.cpu_count() or 1
     journal = Journal(observer or SilentObserver())
     if kernels_are_cold():
-        with journal.stage("compiling"):
+        with journal.stage("compiling"), second_process():
             extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
     with journal.stage("scene"):
         frame, scene = make_frame(cloud.points, config)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import repeat
@@ -83,8 +82,9 @@ class Turns:
         findings: list[Finding] = []
         rejected: Counter[str] = Counter()
         with ThreadPoolExecutor(self._threads) as pool:
-            while outcomes := self._next_outcomes(pool, as_rows([finding.segment for finding in findings])):
-                for outcome in outcomes:
+            while clusters := self._next_clusters():
+                known = as_rows([finding.segment for finding in findings])
+                for outcome in list(pool.map(self._try, clusters, repeat(known))):
                     found = self._new_or_known(outcome, findings)
                     if isinstance(found, Finding):
                         findings.append(found)
@@ -102,20 +102,18 @@ class Turns:
         journal.report("verification", len(findings) + rejected.total(), len(findings), rejected)
         return findings
 
-    def _next_outcomes(self, pool: ThreadPoolExecutor, known: FloatArray) -> list[Finding | Refusal]:
-        """Try the next few clusters; each is fitted while the game goes on with the next one."""
-        return list(pool.map(self._try, self._next_clusters(), repeat(known)))
-
-    def _next_clusters(self) -> Iterator[tuple[Cluster, Segment]]:
+    def _next_clusters(self) -> list[tuple[Cluster, Segment]]:
         """Take the next few clusters out of the game, each with its average; the paper takes one at a time."""
-        for _ in range(ROUND if self._removes else 1):
+        clusters: list[tuple[Cluster, Segment]] = []
+        while len(clusters) < (ROUND if self._removes else 1):
             cluster = self._game.next_cluster()
             if cluster is None:
                 break
             average = average_cluster(self._players, cluster, self._config.averaging)
-            yield cluster, average
+            clusters.append((cluster, average))
             if self._removes:
                 self._game.withdraw(self._game.explained_by(average, closely=True))
+        return clusters
 
     def _try(self, candidate: tuple[Cluster, Segment], known: FloatArray) -> Finding | Refusal:
         """Fit an average and judge it: the finding, or why it is none."""

@@ -1,10 +1,36 @@
-"""The first run after an installation compiles the kernels; show that as a stage of its own."""
+"""The first run after an installation compiles the kernels: a stage of its own, shared with a second process.
+
+Numba compiles one kernel at a time in a process, and keeps what it has compiled in files. While this process practises
+the method from its beginning on, another one practises its end; what that has finished need only be read here.
+"""
 
 from __future__ import annotations
 
-import numpy as np
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
-from cylx.geometry.morton import find_cell
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.config import Config
+from cylx.geometry.cells import Cells
+from cylx.geometry.morton import find_cell, morton_codes
+from cylx.pipeline.conclusion import conclude
+from cylx.pipeline.journal import Journal
+from cylx.pipeline.sources import candidates_of_windows
+from cylx.pipeline.turns import Turns
+from cylx.records import Candidates, Explained, Frame, Ground, Noise, PointCloud, Scene, SilentObserver
+from cylx.scene import resolve
+from cylx.stages.clustering import CandidateGame
+
+FloatArray = NDArray[np.float64]
+
+SPACING, SIGMA = 0.1, 0.005
+LEVEL = 16
+"""Of the voxels; below them a kernel cannot tell cells from one another anyway."""
 
 
 def kernels_are_cold() -> bool:
@@ -14,11 +40,72 @@ def kernels_are_cold() -> bool:
     return bool(sum(find_cell.stats.cache_misses.values()) > before)
 
 
-def practice_cloud() -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def practice_cloud() -> FloatArray:
     """Give a small cloud that calls every kernel: two cylinders and a floor, shape (N, 3)."""
     rng = np.random.default_rng(0)
     turn, height = 2.0 * np.pi * rng.random(2500), 4.0 * rng.random(2500)
     cylinder = np.column_stack([np.cos(turn), np.sin(turn), height])
     floor = np.column_stack([12.0 * rng.random((2500, 2)) - 4.0, np.zeros(2500)])
     points = np.concatenate([cylinder, cylinder + np.array([4.0, 0.0, 0.0]), floor])
-    return np.asarray(points + 0.005 * rng.standard_normal(points.shape))
+    return np.asarray(points + SIGMA * rng.standard_normal(points.shape))
+
+
+@contextmanager
+def second_process() -> Iterator[None]:
+    """Let another process compile the kernels of the method's end meanwhile, where one can be started."""
+    if not (sys.executable and Path(sys.executable).stem.startswith("python")):
+        yield  # an interpreter inside another program
+        return
+    command = [sys.executable, "-c", f"from {__name__} import practise_the_end; practise_the_end()"]
+    try:
+        helper = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+    except OSError:
+        yield
+        return
+    try:
+        yield
+    finally:
+        helper.kill()
+        helper.wait()
+
+
+def practise_the_end() -> None:
+    """Go through the method from the game on, and through local slices, with candidates that are known."""
+    scene = Scene(SPACING, SIGMA, 16.0)
+    config = resolve(Config(), scene)
+    cloud = PointCloud(practice_cloud())
+    frame = _practice_frame(cloud.points)
+    radii, journal = (0.5, 100.0), Journal(SilentObserver())
+    explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
+    ground = Ground(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
+    players = _practice_candidates(frame)
+    game = CandidateGame(players, config.clustering, 1)
+    turns = Turns(game, players, players, ground, radii, config, 1)
+    findings = turns.merge(turns.play(journal), journal)
+    conclude(cloud, frame, scene, ground, findings, turns.refused, journal.reports, config)
+    candidates_of_windows(frame, explained, radii, config, 1, journal)
+
+
+def _practice_frame(points: FloatArray) -> Frame:
+    """Put the practice cloud into its frame without measuring it."""
+    corner, side = points.min(axis=0), float(np.ptp(points, axis=0).max())
+    unit = side / SPACING / (2**21 - 2)
+    codes = morton_codes((points - corner) / SPACING, unit, side / SPACING)
+    order = np.argsort(codes)
+    noise = Noise(np.array([1.0, 10.0]), np.full(2, SIGMA / SPACING))
+    inside = np.ascontiguousarray(((points - corner) / SPACING)[order])
+    return Frame(inside, order, codes[order], unit, LEVEL, 6.0 * unit * 2.0**LEVEL, noise, corner, SPACING)
+
+
+def _practice_candidates(frame: Frame) -> Candidates:
+    """Give candidates of the two cylinders of the practice cloud."""
+    rng = np.random.default_rng(1)
+    models = np.empty((60, 7))
+    models[:, :3] = np.column_stack([4.0 * (np.arange(60) % 2), np.zeros(60), 4.0 * rng.random(60)])
+    models[:, :3] = (models[:, :3] - frame.origin) / frame.spacing
+    models[:, 3:6] = np.array([0.0, 0.0, 1.0]) + 0.002 * rng.standard_normal((60, 3))
+    models[:, 3:6] /= np.linalg.norm(models[:, 3:6], axis=1, keepdims=True)
+    models[:, 6] = (1.0 + 0.002 * rng.standard_normal(60)) / frame.spacing
+    return Candidates(models, np.arange(60), np.full(60, 5.0), np.full(60, 100), np.full(60, 5.0))

@@ -1,0 +1,311 @@
+"""Maximum-likelihood fit of a cylinder to points of which a share scatters more widely than the rest.
+
+The residuals are taken for a mixture of two Gaussians, one of the surface and a broader one of outliers, whose share
+and width are estimated with the cylinder by expectation maximisation (Dempster, Laird and Rubin, JRSS B 39, 1977). A
+Gauss-Newton step solves the normal equations of the points weighted by what either part makes of them, the
+Cramer-Rao bound is reached, and the covariance is that of an M-estimator (Huber, 1967), which stays true where the
+residuals are no such mixture.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from cylx.geometry.small_matrices import fill_frame
+
+FloatArray = NDArray[np.float64]
+
+BINS = 240
+"""Steps of the residual in which its law and the weights are tabulated."""
+ROUNDS, STEPS, EM_STEPS = 3, 3, 40
+LEAST_RATIO = 1.3
+"""An outlier part that is hardly broader than the other cannot be told from it."""
+LEAST_POINTS = 12
+ONE_SIDED = 25.0
+"""Chi-square of five degrees of freedom beyond which the outliers lie to one side, and tell nothing of the surface."""
+
+
+class Law(NamedTuple):
+    """How residuals scatter.
+
+    Parameters
+    ----------
+    deviation, broad : float
+        Standard deviations of the surface and of the outliers.
+    share : float
+        Of outliers among the points, in [0, 1).
+    """
+
+    def weights(self, width: float, *, outliers: bool) -> FloatArray:
+        """Tabulate what a residual weighs, shape (BINS + 1, 3), at equal steps of its absolute value up to `width`.
+
+        The columns are the weight, the derivative of the score (weight times residual), and what the outliers have in
+        the weight. Without `outliers`, what may be one weighs that much less, and nothing as an outlier.
+        """
+        squares = (width * np.arange(BINS + 1) / BINS) ** 2
+        narrow, broad = self.deviation**2, self.broad**2
+        outer = _posterior(squares, narrow, broad, self.share)
+        gain = 1.0 / broad if outliers else 0.0
+        weight = (1.0 - outer) / narrow + outer * gain
+        slope = weight - outer * (1.0 - outer) * squares * (1.0 / narrow - gain) * (1.0 / narrow - 1.0 / broad)
+        return np.column_stack([weight, slope, outer / broad])
+
+    deviation: float
+    broad: float
+    share: float
+
+
+class MixtureFit(NamedTuple):
+    """A cylinder with its uncertainty.
+
+    Parameters
+    ----------
+    model : ndarray of shape (7,)
+        A point of the axis, its unit direction, and the radius, freed of its bias.
+    covariance : ndarray of shape (5, 5)
+        Of two offsets of the axis at its point, its two tilts (radians), and the radius. The first offset and tilt are
+        along the first of the two directions of `fill_frame`, the others along the second.
+    law : Law
+    """
+
+    model: FloatArray
+    covariance: FloatArray
+    law: Law
+
+
+def fit_mixture(
+    points: FloatArray, model: FloatArray, *, low: float, high: float, width: float, deviation: float
+) -> MixtureFit | None:
+    """Fit a cylinder by maximum likelihood, starting from a robust fit.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+    model : ndarray of shape (7,)
+        Start: a point of the axis, its unit direction, the radius. Not changed.
+    low, high : float
+        Only points whose height from the model's point lies between these take part.
+    width : float
+        Only points this near to the surface take part: a few deviations of the surface.
+    deviation : float
+        Standard deviation of the surface, to start with.
+
+    Returns
+    -------
+    MixtureFit or None
+        None if fewer than a dozen points take part, or the fit breaks down or leaves its start by more than `width`.
+    """
+    fitted = np.array(model, dtype=np.float64)
+    points = np.ascontiguousarray(points)
+    law, symmetric = Law(min(deviation, 0.3 * width), min(3.0 * deviation, 0.6 * width), 0.1), True
+    for _ in range(ROUNDS):
+        counts = np.zeros(BINS)
+        _count_residuals(points, fitted, low, high, width, counts)
+        law = estimate_law(counts, width, law)
+        for _ in range(STEPS):
+            sums = _Sums.of(points, fitted, low, high, width, law.weights(width, outliers=symmetric))
+            if sums.count < LEAST_POINTS or not _advance(fitted, sums):
+                return None
+        if symmetric and law.share > 0.0:
+            full = _Sums.of(points, fitted, low, high, width, law.weights(width, outliers=True), full=True)
+            symmetric = full.one_sidedness() < ONE_SIDED
+    sums = _Sums.of(points, fitted, low, high, width, law.weights(width, outliers=symmetric), full=True)
+    covariance = sums.covariance()
+    aside = np.linalg.norm(np.cross(fitted[:3] - model[:3], model[3:6]))
+    if covariance is None or not abs(fitted[6] - model[6]) + aside < width:
+        return None
+    fitted[6] -= sums.count / sums.weight / (2.0 * fitted[6])
+    return MixtureFit(fitted, covariance, law)
+
+
+def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:
+    """Estimate how residuals scatter by expectation maximisation.
+
+    Parameters
+    ----------
+    counts : ndarray of shape (BINS,)
+        How many there are, by absolute value, in equal steps up to `width`.
+    width : float
+    start : Law
+
+    Returns
+    -------
+    Law
+        Without outliers if the other part would not be broader by `LEAST_RATIO`.
+    """
+    squares = (width * (np.arange(BINS) + 0.5) / BINS) ** 2
+    total = float(counts.sum())
+    if total == 0.0:
+        return start
+    narrow, broad, share = start.deviation**2, start.broad**2, max(start.share, 0.02)
+    for _ in range(EM_STEPS):
+        outer = counts * _posterior(squares, narrow, broad, share)
+        mass = float(outer.sum())
+        share = mass / total
+        if mass < 1e-3 * total:
+            break
+        broad = float(outer @ squares) / mass
+        narrow = float((counts - outer) @ squares) / max(total - mass, 1e-9 * total)
+    if share < 1e-3 or broad < LEAST_RATIO**2 * narrow:
+        everything = math.sqrt(float(counts @ squares) / total)
+        return Law(everything, everything, 0.0)
+    return Law(math.sqrt(narrow), math.sqrt(broad), share)
+
+
+def _posterior(squares: FloatArray, narrow: float, broad: float, share: float) -> FloatArray:
+    """Give the probability that residuals of these squares are outliers, from the two variances."""
+    if share <= 0.0:
+        return np.zeros_like(squares)
+    ratio = (1.0 - share) / share * math.sqrt(broad / narrow)
+    return np.asarray(1.0 / (1.0 + ratio * np.exp(-0.5 * squares * (1.0 / narrow - 1.0 / broad))))
+
+
+class _Sums:
+    """Sums over the points of one pass.
+
+    Attributes
+    ----------
+    normal, right : ndarray of shape (5, 5), (5,)
+        The weighted normal equations.
+    slopes, scores, outer_scores : ndarray of shape (5, 5)
+        Of the derivative of the score, and of the squares of the score and of that of the outliers.
+    outer_right : ndarray of shape (5,)
+        Score of the outliers.
+    count, weight, reach : float
+    """
+
+    def __init__(self, reach: float) -> None:
+        self.normal, self.slopes, self.scores, self.outer_scores = np.zeros((4, 5, 5))
+        self.right, self.outer_right = np.zeros((2, 5))
+        self.frame = np.empty((2, 3))
+        self.reach = reach
+        self.count = self.weight = 0.0
+
+    @classmethod
+    def of(
+        cls,
+        points: FloatArray,
+        model: FloatArray,
+        low: float,
+        high: float,
+        width: float,
+        weights: FloatArray,
+        *,
+        full: bool = False,
+    ) -> _Sums:
+        """Sum over the points; with all that the covariance takes if `full`."""
+        self = cls(max(abs(low), abs(high)))
+        matrices = np.zeros((4, 5, 5))
+        vectors = np.zeros((3, 5))
+        fill_frame(model[3:6], self.frame)
+        _fill_sums(points, model, self.frame, low, high, width, self.reach, weights, full, matrices, vectors)
+        lower = np.tril_indices(5, -1)
+        for matrix in matrices:
+            matrix[lower[1], lower[0]] = matrix[lower]
+        self.normal, self.slopes, self.scores, self.outer_scores = matrices
+        self.right, self.outer_right = vectors[:2]
+        self.count, self.weight = float(vectors[2, 0]), float(vectors[2, 1])
+        return self
+
+    def one_sidedness(self) -> float:
+        """Give chi-square of five degrees of freedom of the outliers about the surface."""
+        scores = self.outer_scores + 1e-9 * np.trace(self.outer_scores) * np.eye(5)
+        return float(self.outer_right @ np.linalg.lstsq(scores, self.outer_right, rcond=None)[0])
+
+    def covariance(self) -> FloatArray | None:
+        """Give the covariance of an M-estimator, for heights in units of length; None if it is not determined."""
+        try:
+            inverse = np.linalg.inv(self.slopes)
+        except np.linalg.LinAlgError:
+            return None
+        few = self.count / max(self.count - 5.0, 1.0)  # five parameters were fitted to these residuals
+        scale = np.array([1.0, 1.0, 1.0 / self.reach, 1.0 / self.reach, 1.0])
+        covariance = few * inverse @ self.scores @ inverse.T * np.outer(scale, scale)
+        good = np.isfinite(covariance).all() and (np.diag(covariance) >= 0.0).all()
+        return np.asarray(0.5 * (covariance + covariance.T)) if good else None
+
+
+def _advance(model: FloatArray, sums: _Sums) -> bool:
+    """Move a model by a step; False if there is none."""
+    try:
+        step = np.linalg.solve(sums.normal, sums.right)
+    except np.linalg.LinAlgError:
+        return False
+    if not np.abs(step).max() < 0.5 * model[6]:
+        return False
+    model[:3] += step[:2] @ sums.frame
+    model[3:6] += step[2:4] @ sums.frame / sums.reach
+    model[3:6] /= np.linalg.norm(model[3:6])
+    model[6] += step[4]
+    return bool(model[6] > 0.0)
+
+
+@njit(cache=True, nogil=True)
+def _count_residuals(
+    points: FloatArray, model: FloatArray, low: float, high: float, width: float, counts: FloatArray
+) -> None:
+    for i in range(len(points)):
+        z, square = 0.0, 0.0
+        for d in range(3):
+            offset = points[i, d] - model[d]
+            z += offset * model[3 + d]
+            square += offset * offset
+        residual = abs(math.sqrt(max(square - z * z, 0.0)) - model[6])
+        if low <= z <= high and residual < width:
+            counts[int(residual / width * len(counts))] += 1.0
+
+
+@njit(cache=True, nogil=True)
+def _fill_sums(
+    points: FloatArray,
+    model: FloatArray,
+    frame: FloatArray,
+    low: float,
+    high: float,
+    width: float,
+    reach: float,
+    weights: FloatArray,
+    full: bool,
+    matrices: FloatArray,
+    vectors: FloatArray,
+) -> None:
+    """Fill what `_Sums` has; heights are in units of the reach."""
+    row = np.empty(5)
+    for i in range(len(points)):
+        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+        z = dx * model[3] + dy * model[4] + dz * model[5]
+        if z < low or z > high:
+            continue
+        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        distance = math.sqrt(x * x + y * y) + 1e-300
+        residual = distance - model[6]
+        if abs(residual) >= width:
+            continue
+        place = abs(residual) / width * (len(weights) - 1)
+        k = int(place)
+        part = place - k
+        weight = (1.0 - part) * weights[k, 0] + part * weights[k + 1, 0]
+        row[0], row[1] = x / distance, y / distance
+        row[2], row[3], row[4] = z / reach * row[0], z / reach * row[1], 1.0
+        vectors[2, 0] += 1.0
+        vectors[2, 1] += weight
+        score = weight * residual
+        for a in range(5):
+            vectors[0, a] += score * row[a]
+            for b in range(a + 1):
+                matrices[0, a, b] += weight * row[a] * row[b]
+        if full:
+            slope = (1.0 - part) * weights[k, 1] + part * weights[k + 1, 1]
+            outer = ((1.0 - part) * weights[k, 2] + part * weights[k + 1, 2]) * residual
+            for a in range(5):
+                vectors[1, a] += outer * row[a]
+                for b in range(a + 1):
+                    matrices[1, a, b] += slope * row[a] * row[b]
+                    matrices[2, a, b] += score * score * row[a] * row[b]
+                    matrices[3, a, b] += outer * outer * row[a] * row[b]
