@@ -12,6 +12,8 @@ from math import degrees, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 
 from cylx import __version__
@@ -105,6 +107,17 @@ class Uncertainty(Part):
     covariance: Matrix
     """Of two offsets of the axis, its two tilts and the radius; scene units and radians."""
 
+    @staticmethod
+    def keys_of(covariance: NDArray[np.float64]) -> dict[str, Any]:
+        """Write down a covariance."""
+        variances = np.maximum(np.diag(covariance), 0.0)
+        return {
+            "radius": float(np.sqrt(variances[4])),
+            "axis_angle_deg": degrees(float(np.sqrt(variances[2] + variances[3]))),
+            "axis_offset": float(np.sqrt(variances[0] + variances[1])),
+            "covariance": covariance.tolist(),
+        }
+
 
 class Numbered(Part):
     """What has a number."""
@@ -163,6 +176,7 @@ class Measured(Part):
             "support": int(fit.support),
             "payoff": float(fit.payoff),
             "confidence": fit.confidence,
+            "uncertainty": None if fit.covariance is None else Uncertainty.keys_of(fit.covariance),
             "evidence": evidence or None,
         }
 

@@ -23,7 +23,7 @@ def plane_of(points, noise=TINY):
 def cylinder_of(points, center, normal, noise=TINY):
     """Give the osculating cylinder (7,), or None where there is no curvature."""
     model = np.full(7, np.nan)
-    scratch = np.empty((6, 6)), np.empty(6), np.empty((2, 3)), np.empty(len(points))
+    scratch = np.empty((6, 6)), np.empty(6), np.empty((2, 3)), np.empty((len(points), 4))
     return model if osculating_cylinder(points, len(points), noise, center, normal, model, *scratch) else None
 
 

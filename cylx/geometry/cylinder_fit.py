@@ -68,7 +68,6 @@ def _accumulate(
     normal: FloatArray,
     right: FloatArray,
     frame: FloatArray,
-    row: FloatArray,
     sums: FloatArray,
     stride: int,
 ) -> None:
@@ -77,11 +76,12 @@ def _accumulate(
     `sums` gets the weights, the squares and the largest height.
     """
     fill_frame(model[3:6], frame)
-    for a in range(5):
-        right[a] = 0.0
-        for b in range(5):
-            normal[a, b] = 0.0
     weights, squares, reach = 0.0, 0.0, 0.0
+    # with (cos, sin, z cos, z sin, 1) as the row of a point, sums of products are shared; scalars stay in registers
+    c, s, cc, cs, ss = 0.0, 0.0, 0.0, 0.0, 0.0
+    zc, zs, zcc, zcs, zss = 0.0, 0.0, 0.0, 0.0, 0.0
+    zzcc, zzcs, zzss = 0.0, 0.0, 0.0
+    rc, rs, rzc, rzs, r = 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(0, n, stride):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
         z = dx * model[3] + dy * model[4] + dz * model[5]
@@ -95,19 +95,25 @@ def _accumulate(
         if abs(ratio) >= 1.0:
             continue
         weight = (1.0 - ratio * ratio) ** 2
-        row[0], row[1] = x / distance, y / distance
-        row[2], row[3], row[4] = z * row[0], z * row[1], 1.0
-        for a in range(5):
-            scaled = weight * row[a]
-            right[a] += scaled * residual
-            for b in range(a + 1):
-                normal[a, b] += scaled * row[b]
+        cosine, sine = x / distance, y / distance
+        wc, ws, wr = weight * cosine, weight * sine, weight * residual
+        wcc, wcs, wss = wc * cosine, wc * sine, ws * sine
+        c, s, cc, cs, ss = c + wc, s + ws, cc + wcc, cs + wcs, ss + wss
+        zc, zs, zcc, zcs, zss = zc + z * wc, zs + z * ws, zcc + z * wcc, zcs + z * wcs, zss + z * wss
+        zzcc, zzcs, zzss = zzcc + z * z * wcc, zzcs + z * z * wcs, zzss + z * z * wss
+        rc, rs, r = rc + wr * cosine, rs + wr * sine, r + wr
+        rzc, rzs = rzc + z * wr * cosine, rzs + z * wr * sine
         weights += weight
         squares += weight * residual * residual
         reach = max(reach, abs(z))
+    normal[0, 0], normal[0, 1], normal[0, 2], normal[0, 3], normal[0, 4] = cc, cs, zcc, zcs, c
+    normal[1, 1], normal[1, 2], normal[1, 3], normal[1, 4] = ss, zcs, zss, s
+    normal[2, 2], normal[2, 3], normal[2, 4] = zzcc, zzcs, zc
+    normal[3, 3], normal[3, 4], normal[4, 4] = zzss, zs, weights
+    right[0], right[1], right[2], right[3], right[4] = rc, rs, rzc, rzs, r
     for a in range(5):
         normal[a, a] *= 1.0 + 1e-9
-        for b in range(a + 1, 5):
+        for b in range(a):
             normal[a, b] = normal[b, a]
     sums[0], sums[1], sums[2] = weights, squares, reach
 
@@ -155,10 +161,10 @@ def fit_in_place(
     """
     width, floor, decay, tuning, tolerance = schedule[0], schedule[1], schedule[2], schedule[3], schedule[4]
     spread = width / 3.0
-    row, sums = np.empty(5), np.empty(3)
+    sums = np.empty(3)
     stride = int(schedule[6])
     for _ in range(int(schedule[5])):
-        _accumulate(points, n, model, low, high, width, normal, right, frame, row, sums, stride)
+        _accumulate(points, n, model, low, high, width, normal, right, frame, sums, stride)
         if sums[0] < 8.0 or not solve_in_place(normal, right):
             return -1.0
         spread = math.sqrt(sums[1] / sums[0])

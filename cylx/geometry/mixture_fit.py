@@ -23,6 +23,8 @@ FloatArray = NDArray[np.float64]
 BINS = 240
 """Steps of the residual in which its law and the weights are tabulated."""
 ROUNDS, STEPS, EM_STEPS = 3, 3, 40
+SETTLED = 1e-4
+"""The estimate of how residuals scatter ends when a variance changes by less than this share."""
 LEAST_RATIO = 1.3
 """An outlier part that is hardly broader than the other cannot be told from it."""
 LEAST_POINTS = 12
@@ -139,20 +141,23 @@ def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:
         Without outliers if the other part would not be broader by `LEAST_RATIO`.
     """
     squares = (width * (np.arange(BINS) + 0.5) / BINS) ** 2
-    total = float(counts.sum())
+    total, all_squares = float(counts.sum()), float(counts @ squares)
     if total == 0.0:
         return start
     narrow, broad, share = start.deviation**2, start.broad**2, max(start.share, 0.02)
     for _ in range(EM_STEPS):
         outer = counts * _posterior(squares, narrow, broad, share)
-        mass = float(outer.sum())
+        mass, last = float(outer.sum()), narrow
         share = mass / total
         if mass < 1e-3 * total:
             break
-        broad = float(outer @ squares) / mass
-        narrow = float((counts - outer) @ squares) / max(total - mass, 1e-9 * total)
+        outer_squares = float(outer @ squares)
+        broad = outer_squares / mass
+        narrow = (all_squares - outer_squares) / max(total - mass, 1e-9 * total)
+        if abs(narrow - last) < SETTLED * narrow:
+            break
     if share < 1e-3 or broad < LEAST_RATIO**2 * narrow:
-        everything = math.sqrt(float(counts @ squares) / total)
+        everything = math.sqrt(all_squares / total)
         return Law(everything, everything, 0.0)
     return Law(math.sqrt(narrow), math.sqrt(broad), share)
 

@@ -28,7 +28,9 @@ def fit_plane(
     matrix: FloatArray,
     vectors: FloatArray,
 ) -> float:
-    """Fit a plane to points[:n] by principal components, trimmed three times; fill `center` (3,) and `normal` (3,).
+    """Fit a plane to points[:n] about zero by principal components, trimmed three times.
+
+    Fills `center` (3,) and `normal` (3,).
 
     Returns
     -------
@@ -39,20 +41,20 @@ def fit_plane(
     width = math.inf
     for _ in range(4):
         mx, my, mz, count = 0.0, 0.0, 0.0, 0
-        for i in range(n):
-            if width < math.inf and abs(_height(points, i, center, normal)) >= width:
-                continue
-            mx, my, mz, count = mx + points[i, 0], my + points[i, 1], mz + points[i, 2], count + 1
-        if count < 10:
-            return 0.0
-        mx, my, mz = mx / count, my / count, mz / count
         xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         for i in range(n):
             if width < math.inf and abs(_height(points, i, center, normal)) >= width:
                 continue
-            x, y, z = points[i, 0] - mx, points[i, 1] - my, points[i, 2] - mz
+            x, y, z = points[i, 0], points[i, 1], points[i, 2]
+            mx, my, mz, count = mx + x, my + y, mz + z, count + 1
             xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
             yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
+        if count < 10:
+            return 0.0
+        mx, my, mz = mx / count, my / count, mz / count
+        # the points lie about zero, so that little is lost by taking the means off the sums
+        xx, xy, xz = xx - count * mx * mx, xy - count * mx * my, xz - count * mx * mz
+        yy, yz, zz = yy - count * my * my, yz - count * my * mz, zz - count * mz * mz
         matrix[0, 0], matrix[0, 1], matrix[0, 2] = xx, xy, xz
         matrix[1, 0], matrix[1, 1], matrix[1, 2] = xy, yy, yz
         matrix[2, 0], matrix[2, 1], matrix[2, 2] = xz, yz, zz
@@ -93,7 +95,7 @@ def osculating_cylinder(
     gram: FloatArray,
     terms: FloatArray,
     frame: FloatArray,
-    heights: FloatArray,
+    local: FloatArray,
 ) -> bool:
     """Fit a quadric over a plane to points[:n] and fill `model` (7,) with the cylinder that osculates it.
 
@@ -101,7 +103,7 @@ def osculating_cylinder(
     ----------
     center, normal : ndarray of shape (3,)
         The plane, from `fit_plane`.
-    gram, terms, frame, heights : ndarray of shape (6, 6), (6,), (2, 3), (>= n,)
+    gram, terms, frame, local : ndarray of shape (6, 6), (6,), (2, 3), (>= n, 4)
         Scratch.
 
     Returns
@@ -110,54 +112,57 @@ def osculating_cylinder(
         False if there are too few points or the surface is not curved.
     """
     fill_frame(normal, frame)
-    row = np.empty(6)
+    for i in range(n):
+        dx, dy, dz = points[i, 0] - center[0], points[i, 1] - center[1], points[i, 2] - center[2]
+        local[i, 0] = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+        local[i, 1] = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        local[i, 2] = dx * normal[0] + dy * normal[1] + dz * normal[2]
     width = math.inf
     for _ in range(4):
-        for a in range(6):
-            terms[a] = 0.0
-            for b in range(6):
-                gram[a, b] = 0.0
-        count = 0
-        for i in range(n):
-            if width < math.inf and abs(heights[i]) > width:
-                continue
-            z = _fill_row(points, i, center, normal, frame, row)
-            for a in range(6):
-                terms[a] += row[a] * z
-                for b in range(a + 1):
-                    gram[a, b] += row[a] * row[b]
-            count += 1
-        if count < 10:
-            return False
-        for a in range(6):
-            for b in range(a + 1, 6):
-                gram[a, b] = gram[b, a]
-        if not solve_in_place(gram, terms):
+        if _fill_moments(local, n, width, gram, terms) < 10 or not solve_in_place(gram, terms):
             return False
         total, count = 0.0, 0
         for i in range(n):
-            z = _fill_row(points, i, center, normal, frame, row)
-            inside = width == math.inf or abs(heights[i]) <= width
-            for a in range(6):
-                z -= terms[a] * row[a]
-            heights[i] = z
-            if inside:
+            x, y = local[i, 0], local[i, 1]
+            z = local[i, 2] - terms[0] * x * x - terms[1] * x * y - terms[2] * y * y
+            z -= terms[3] * x + terms[4] * y + terms[5]
+            if width == math.inf or abs(local[i, 3]) <= width:
                 total += abs(z)
                 count += 1
+            local[i, 3] = z
         width = max(2.5 * noise, 2.5 * total / count)  # two standard deviations, from the mean deviation
     return _fill_model(terms, center, normal, frame, model)
 
 
 @njit(cache=True, nogil=True)
-def _fill_row(
-    points: FloatArray, i: int, center: FloatArray, normal: FloatArray, frame: FloatArray, row: FloatArray
-) -> float:
-    """Fill the row of the design matrix of point i, and give its height over the plane."""
-    dx, dy, dz = points[i, 0] - center[0], points[i, 1] - center[1], points[i, 2] - center[2]
-    x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-    y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-    row[0], row[1], row[2], row[3], row[4], row[5] = x * x, x * y, y * y, x, y, 1.0
-    return float(dx * normal[0] + dy * normal[1] + dz * normal[2])
+def _fill_moments(local: FloatArray, n: int, width: float, gram: FloatArray, terms: FloatArray) -> int:
+    """Fill the normal equations of a quadric over the plane from points whose last residual is within `width`."""
+    x1, y1, x2, xy, y2 = 0.0, 0.0, 0.0, 0.0, 0.0
+    x3, x2y, xy2, y3 = 0.0, 0.0, 0.0, 0.0
+    x4, x3y, x2y2, xy3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0
+    z1, xz, yz, x2z, xyz, y2z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    count = 0
+    for i in range(n):
+        if width < math.inf and abs(local[i, 3]) > width:
+            continue
+        x, y, z = local[i, 0], local[i, 1], local[i, 2]
+        xx, product, yy = x * x, x * y, y * y
+        x1, y1, x2, xy, y2 = x1 + x, y1 + y, x2 + xx, xy + product, y2 + yy
+        x3, x2y, xy2, y3 = x3 + xx * x, x2y + xx * y, xy2 + x * yy, y3 + yy * y
+        x4, x3y, x2y2, xy3, y4 = x4 + xx * xx, x3y + xx * product, x2y2 + xx * yy, xy3 + product * yy, y4 + yy * yy
+        z1, xz, yz = z1 + z, xz + x * z, yz + y * z
+        x2z, xyz, y2z = x2z + xx * z, xyz + product * z, y2z + yy * z
+        count += 1
+    terms[0], terms[1], terms[2], terms[3], terms[4], terms[5] = x2z, xyz, y2z, xz, yz, z1
+    gram[0, 0], gram[0, 1], gram[0, 2], gram[0, 3], gram[0, 4], gram[0, 5] = x4, x3y, x2y2, x3, x2y, x2
+    gram[1, 1], gram[1, 2], gram[1, 3], gram[1, 4], gram[1, 5] = x2y2, xy3, x2y, xy2, xy
+    gram[2, 2], gram[2, 3], gram[2, 4], gram[2, 5] = y4, xy2, y3, y2
+    gram[3, 3], gram[3, 4], gram[3, 5] = x2, xy, x1
+    gram[4, 4], gram[4, 5], gram[5, 5] = y2, y1, count
+    for a in range(6):
+        for b in range(a):
+            gram[a, b] = gram[b, a]
+    return count
 
 
 @njit(cache=True, nogil=True)

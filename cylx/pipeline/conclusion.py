@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.measures import covered_angle
@@ -19,6 +20,9 @@ from cylx.records import (
     StageReport,
 )
 from cylx.stages.labelling import label_points, surface_points
+
+STRUCTURED = 1.4
+"""A lack of fit (chi-square per cell) beyond this is none by chance."""
 
 
 def conclude(
@@ -66,6 +70,7 @@ def conclude(
             findings[i].payoff,
             findings[i].confidence if verified else None,
             findings[i].measures,
+            _covariance(findings[i], frame.spacing),
         )
         for i in order
     ]
@@ -78,6 +83,20 @@ def conclude(
     lost = [Refusal.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
     rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified))
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
+
+
+def _covariance(finding: Finding, spacing: float) -> NDArray[np.float64] | None:
+    """Put the covariance of a finding into scene units.
+
+    Where the residuals are structured beyond noise, because the object is no perfect cylinder or its noise is shared by
+    neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
+    """
+    covariance = finding.segment.covariance
+    if covariance is None:
+        return None
+    lack = finding.measures.get("lack_of_fit", 1.0)
+    units = np.array([spacing, spacing, 1.0, 1.0, spacing])
+    return np.asarray(covariance * np.outer(units, units) * (lack if lack > STRUCTURED else 1.0))
 
 
 def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verified: bool) -> list[Rejection]:

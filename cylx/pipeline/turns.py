@@ -16,7 +16,7 @@ from cylx.consensus import Neighbourhood, is_contradicted
 from cylx.geometry.lines import are_along
 from cylx.pipeline.journal import Journal
 from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
-from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
+from cylx.stages.averaging import average_cluster, finish, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
@@ -150,7 +150,8 @@ class Turns:
             joined = len(distinct) - len(pieces)
             claimed = len(findings) - joined - len(kept)
         if self._config.averaging.refine:
-            finished = [self._finish(finding) for finding in kept]
+            with ThreadPoolExecutor(self._threads) as pool:
+                finished = list(pool.map(self._finish, kept))
             strayed = [Refusal.of(one, reason) for one in finished if (reason := self._out_of_range(one.segment))]
             kept = [finding for finding in finished if not self._out_of_range(finding.segment)]
             self.refused += strayed
@@ -165,7 +166,7 @@ class Turns:
 
     def _finish(self, finding: Finding) -> Finding:
         """Fit a finding to all its points; up to here a sample of them was enough."""
-        fitted = refit(finding.segment, self._ground)
+        fitted = finish(finding.segment, self._ground)
         return finding if isinstance(fitted, str) else replace(finding, segment=fitted)
 
     def _enough(self, findings: list[Finding]) -> bool:

@@ -32,11 +32,15 @@ class Segment:
         Half its height.
     spread : float
         Robust standard deviation of its residuals; 0 if it was not fitted.
+    covariance : ndarray of shape (5, 5), optional
+        Of two offsets of the axis, its two tilts and the radius, in the frame of `fill_frame`; None before the last
+        fit.
     """
 
     model: FloatArray
     half: float
     spread: float
+    covariance: FloatArray | None = None
 
     @property
     def cylinder(self) -> Cylinder:
@@ -137,6 +141,9 @@ class CylinderFit:
         Probability that it is a cylinder; None if it was not verified.
     evidence : mapping of str to float
         What the verification measured, by the name of the test.
+    covariance : ndarray of shape (5, 5) or None
+        Of two offsets of the axis at its point, along the two directions of `cylx.geometry.cylinder.axis_frame`, of
+        two tilts of the axis towards them, and of the radius; scene units and radians. None if it was not computed.
     """
 
     cylinder: Cylinder
@@ -147,6 +154,7 @@ class CylinderFit:
     payoff: float
     confidence: float | None = None
     evidence: Mapping[str, float] = field(default_factory=dict)
+    covariance: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

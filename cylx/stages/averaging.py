@@ -17,6 +17,7 @@ from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import points_on, visible_extent
+from cylx.geometry.mixture_fit import fit_mixture
 from cylx.records import Candidates, Cluster, Ground, Segment
 
 FloatArray = NDArray[np.float64]
@@ -31,6 +32,8 @@ MANY = 20000
 """Points that suffice to judge it; the last fit takes all."""
 BEYOND = 1.02
 """A fit goes this much further than the ends: the outermost points lie on them, and rounding would choose."""
+SURE = 8.0
+"""Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
 LEAST_COSINE = math.cos(math.radians(25.0))
 """A fit whose axis turns further than this has left the candidates it came from."""
 
@@ -134,22 +137,58 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     Segment or str
         With the bias of the radius taken off; or why there is none.
     """
-    noise, half = ground.noise_about(segment.model, segment.half), segment.half
-    width = max(4.0 * noise, 0.02 * segment.model[6])
-    end = BEYOND * half
-    points = _own_points(ground, segment.model, end, 2.0 * width, most)
-    kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-    fit = (
-        fit_cylinder(points, segment.model, low=-end, high=end, kernel=kernel, steps=15 if most else 60)
-        if len(points) > 19
-        else None
-    )
+    fit = _robust_fit(*_shell(segment, ground, most), segment, ground, steps=15 if most else 60)
     if fit is None:
         return "no fit"
     model, spread = fit
-    spread *= TUKEY_SPREAD
     model[6] = unbiased_radius(model[6], min(spread, 0.5 * model[6]))
-    return Segment(model, half, spread)
+    return Segment(model, segment.half, spread)
+
+
+def finish(segment: Segment, ground: Ground) -> Segment | str:
+    """Fit a cylinder to all its points by maximum likelihood, and say how uncertain it is.
+
+    Parameters
+    ----------
+    segment : Segment
+    ground : Ground
+
+    Returns
+    -------
+    Segment or str
+        With its covariance; that of `refit` without one if the points are too few for it; or why there is none.
+    """
+    points, width = _shell(segment, ground, None)
+    fit = _robust_fit(points, width, segment, ground, steps=15, tolerance=ROUGH)
+    if fit is None:
+        return "no fit"
+    model, spread = fit
+    model[3:6] *= np.sign(model[3 + int(np.abs(model[3:6]).argmax())])  # as the result has it
+    end, deviation = BEYOND * segment.half, max(spread, 1e-9 * model[6])  # points may lie on the surface exactly
+    likely = fit_mixture(
+        points, model, low=-end, high=end, width=min(SURE * deviation, 2.0 * width), deviation=deviation
+    )
+    if likely is None:
+        return refit(segment, ground)
+    return Segment(likely.model, segment.half, spread, likely.covariance)
+
+
+def _shell(segment: Segment, ground: Ground, most: int | None) -> tuple[FloatArray, float]:
+    """Give the points about the surface of a segment, and how near to it those lie that have a say at first."""
+    width = max(4.0 * ground.noise_about(segment.model, segment.half), 0.02 * segment.model[6])
+    return _own_points(ground, segment.model, BEYOND * segment.half, 2.0 * width, most), width
+
+
+def _robust_fit(
+    points: FloatArray, width: float, segment: Segment, ground: Ground, *, steps: int, tolerance: float = 1e-9
+) -> tuple[FloatArray, float] | None:
+    """Fit a cylinder to the points of a segment; give it and the standard deviation about it."""
+    noise, end = ground.noise_about(segment.model, segment.half), BEYOND * segment.half
+    kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, tolerance)
+    if len(points) < 20:
+        return None
+    fit = fit_cylinder(points, segment.model, low=-end, high=end, kernel=kernel, steps=steps)
+    return None if fit is None else (fit[0], fit[1] * TUKEY_SPREAD)
 
 
 def measure_extent(segment: Segment, ground: Ground) -> Segment | str:

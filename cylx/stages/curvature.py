@@ -141,7 +141,7 @@ def _scan(
 ) -> None:
     found = np.empty(CAPACITY, np.int64)
     around, inner = np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
-    plane, heights = np.empty((2, 3)), np.empty(CAPACITY)
+    plane, local = np.empty((2, 3)), np.empty((CAPACITY, 4))
     matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
     right, axes = np.empty(6), np.empty((2, 3))
     quality = np.empty(3)
@@ -160,7 +160,7 @@ def _scan(
             continue
         outcome[s] = 2
         fit_plane(inner, m, noise, plane[0], plane[1], matrix, vectors)
-        if not osculating_cylinder(inner, m, noise, plane[0], plane[1], model, matrix, right, axes, heights):
+        if not osculating_cylinder(inner, m, noise, plane[0], plane[1], model, matrix, right, axes, local):
             continue
         if not (max(0.35 * radius, 4.0 * noise) <= model[6] <= 14.0 * radius):
             continue

@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 
 from cylx.config import VerificationConfig
 from cylx.evidence import weigh
-from cylx.measures import TRUNCATED, continuation, covered_angle, distinct_places, emptiness, lack_of_fit, look_at, shape_of
+from cylx.measures import (
+    TRUNCATED,
+    continuation,
+    covered_angle,
+    distinct_places,
+    emptiness,
+    lack_of_fit,
+    look_at,
+    shape_of,
+)
 from cylx.records import Ground, Segment
 
 LEAST = 20
