@@ -70,24 +70,24 @@ def _stubbiness(measures: Mapping[str, float]) -> float:
     return math.log(min(max(measures["height_radii"], 0.1), 4.0) / 4.0) * (1.0 - measures["agreement"])
 
 
-BIAS = -4.709
+BIAS = -4.845
 TERMS = (
-    Term("noise", -5.717, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    Term("noise", -5.721, 0.05, lambda m: _log(_thickness(m), 1.0, 20.0)),
     # other points inside, just outside, and going on past an end of the arc
-    Term("inside", -0.415, 0.10, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -0.388, 0.47, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
-    Term("tangent", -4.423, 0.02, lambda m: min(m["tangent"], 1.5)),
+    Term("inside", -0.428, 0.10, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -0.386, 0.47, lambda m: _log(m["outside"] / 0.05 + 1.0, 1.0, 400.0)),
+    Term("tangent", -4.399, 0.02, lambda m: min(m["tangent"], 1.5)),
     # how much of a cylinder is there at all
-    Term("coverage", 0.834, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
-    Term("too few points", 0.277, 2.71, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
-    Term("height", 4.295, -0.01, _stubbiness),
-    Term("few lines", 5.029, 0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
+    Term("coverage", 0.938, 0.95, lambda m: min(m["coverage"], math.pi) / math.pi),
+    Term("too few points", 0.305, 2.71, lambda m: _log(m["inliers"] / 60.0, 0.01, 2000.0 / 60.0)),
+    Term("height", 4.290, -0.01, _stubbiness),
+    Term("few lines", 3.496, 0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
     # what the candidates say
-    Term("payoff", 4.045, 0.82, lambda m: m["payoff"]),
-    Term("agreement", 5.764, 0.87, lambda m: m["agreement"]),
+    Term("payoff", 4.052, 0.82, lambda m: m["payoff"]),
+    Term("agreement", 5.731, 0.87, lambda m: m["agreement"]),
     # cones; and whatever is too short to be told from a sphere
-    Term("slope", -18.840, 0.00, _slope),
-    Term("bulge unknown", -45.181, 0.00, lambda m: min(m["bulge_error"], 1.0)),
+    Term("slope", -19.164, 0.00, _slope),
+    Term("bulge unknown", -44.580, 0.00, lambda m: min(m["bulge_error"], 1.0)),
 )
 
 

@@ -148,7 +148,7 @@ def distinct_places(angles: FloatArray, radius: float, deviation: float) -> floa
 def _dense(ordered: FloatArray, reach: float) -> MaskArray:
     """Tell which of sorted angles have so many others within reach that they do not lie between lines."""
     near = np.searchsorted(ordered, ordered + reach, "right") - np.searchsorted(ordered, ordered - reach)
-    usual = 2.0 * reach * len(ordered) / max(float(ordered[-1] - ordered[0]), 2.0 * reach)
+    usual = 2.0 * reach * len(ordered) / max(float(ordered[-1] - ordered[0]), 2.0 * reach, 1e-300)
     return np.asarray(near >= SPARSE * usual, dtype=np.bool_)
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cylx.config import Config, load_config
 from cylx.errors import InputError
-from cylx.geometry.cylinder import cylinder_coordinates, surface_distances
+from cylx.geometry.cylinder import axis_frame, cylinder_coordinates, surface_distances
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud, Source
 from cylx.results import Result
@@ -417,3 +417,28 @@ def test_little_coverage_is_warned_of(theta_deg):
     assert len(extraction.cylinders) == 1
     assert np.isclose(np.degrees(extraction.cylinders[0].coverage), theta_deg, atol=15)
     assert any("covered by less than 60 degrees" in warning for warning in extraction.warnings)
+
+
+def test_uncertainties_hold_the_truth():
+    hits = np.zeros(3)
+    for seed in range(40):
+        scene = single(points=3000, sigma=0.01, p=0.2, sigma_o=0.03, theta_deg=(360.0, 150.0)[seed % 2], seed=seed)
+        fit = extract_cylinders(PointCloud(scene.points), Config(max_cylinders=1)).cylinders[0]
+        true, found = scene.cylinders[0].cylinder, fit.cylinder
+        frame = np.array(axis_frame(found.direction))
+        along = true.direction / (true.direction @ found.direction)
+        away = true.point - found.point
+        offset = frame @ (away - (away @ found.direction) * along)
+        tilt = frame @ (along - found.direction)
+        for i, (error, part) in enumerate([(offset, slice(0, 2)), (tilt, slice(2, 4))]):
+            hits[i] += error @ np.linalg.solve(fit.covariance[part, part], error) < 5.991
+        hits[2] += abs(true.radius - found.radius) < 1.96 * np.sqrt(fit.covariance[4, 4])
+    # 95 % of 40 are 38, with a standard deviation of 1.4
+    assert (hits >= 34).all(), hits
+
+
+def test_without_a_refined_fit_nothing_is_said_of_uncertainty():
+    scene = single(points=2000, seed=0)
+    found = extract_cylinders(PointCloud(scene.points), load_config(preset="paper", overrides=["slicing.planes=20"]))
+    assert all(fit.covariance is None for fit in found.cylinders)
+    assert all(one.uncertainty is None for one in Result.of(found).cylinders)

@@ -6,7 +6,7 @@ import pytest
 from cylx.config import Config, VerificationConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
-from cylx.measures import covered_angle, look_at
+from cylx.measures import PLACES, covered_angle, distinct_places, look_at
 from cylx.records import Ground, Noise, Segment
 from cylx.scene import make_frame
 from cylx.stages.verification import verify
@@ -170,3 +170,28 @@ def test_the_shell_is_what_is_about_the_segment():
     ground, segment = world(pipe(), flat=1e9)
     assert look_at(segment, ground).flat.all()
     assert not look_at(segment, ground).on.any()
+
+
+@pytest.mark.parametrize("lines", [2, 3, 4, 6])
+def test_lines_along_the_axis_are_counted(lines):
+    rng = np.random.default_rng(lines)
+    angles = np.repeat(np.linspace(0.0, 4.0, lines), 200) + 0.02 * rng.standard_normal(200 * lines)
+    turned = (angles + rng.uniform(0, 6) + np.pi) % (2 * np.pi) - np.pi
+    # a line is as wide as the noise makes it: half a place more
+    assert distinct_places(turned, 1.0, 0.02) == pytest.approx(1.55 * lines, abs=0.1 * lines)
+    strays = rng.uniform(-np.pi, np.pi, 6 * lines)
+    assert distinct_places(np.concatenate([turned, strays]), 1.0, 0.02) == pytest.approx(1.55 * lines, abs=0.2 * lines)
+
+
+@pytest.mark.parametrize("n", [20, 100, 5000])
+@pytest.mark.parametrize("arc_deg", [60.0, 200.0, 360.0])
+def test_an_arc_is_no_line(n, arc_deg):
+    rng = np.random.default_rng(n)
+    shares = [distinct_places(np.radians(arc_deg) * rng.random(n), 1.0, 0.02) == PLACES for _ in range(50)]
+    assert np.mean(shares) > 0.95
+
+
+def test_places_of_nothing_and_of_one():
+    assert distinct_places(np.empty(0), 1.0, 0.1) == 0.0
+    assert distinct_places(np.zeros(1), 1.0, 0.1) == 1.0
+    assert 0.0 < distinct_places(np.zeros(50), 1.0, 0.0) <= PLACES

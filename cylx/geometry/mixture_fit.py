@@ -22,7 +22,9 @@ FloatArray = NDArray[np.float64]
 
 BINS = 240
 """Steps of the residual in which its law and the weights are tabulated."""
-ROUNDS, STEPS, EM_STEPS = 3, 3, 40
+ROUNDS, STEPS, EM_STEPS = 3, 5, 40
+CLOSE = 1e-4
+"""Steps end when one is shorter than this share of the deviation."""
 SETTLED = 1e-4
 """The estimate of how residuals scatter ends when a variance changes by less than this share."""
 LEAST_RATIO = 1.3
@@ -109,12 +111,16 @@ def fit_mixture(
         counts = np.zeros(BINS)
         _count_residuals(points, fitted, low, high, width, counts)
         law = estimate_law(counts, width, law)
+        weights = law.weights(width, outliers=symmetric)
         for _ in range(STEPS):
-            sums = _Sums.of(points, fitted, low, high, width, law.weights(width, outliers=symmetric))
-            if sums.count < LEAST_POINTS or not _advance(fitted, sums):
+            sums = _Sums.of(points, fitted, low, high, width, weights)
+            size = _advance(fitted, sums) if sums.count >= LEAST_POINTS else math.inf
+            if not size < math.inf:
                 return None
+            if size < CLOSE * law.deviation:
+                break
         if symmetric and law.share > 0.0:
-            full = _Sums.of(points, fitted, low, high, width, law.weights(width, outliers=True), full=True)
+            full = _Sums.of(points, fitted, low, high, width, weights, full=True)
             symmetric = full.one_sidedness() < ONE_SIDED
     sums = _Sums.of(points, fitted, low, high, width, law.weights(width, outliers=symmetric), full=True)
     covariance = sums.covariance()
@@ -131,7 +137,7 @@ def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:
     Parameters
     ----------
     counts : ndarray of shape (BINS,)
-        How many there are, by absolute value, in equal steps up to `width`.
+        How many there are, by absolute value, in equal steps up to `width`; they need not be whole.
     width : float
     start : Law
 
@@ -235,25 +241,27 @@ class _Sums:
         return np.asarray(0.5 * (covariance + covariance.T)) if good else None
 
 
-def _advance(model: FloatArray, sums: _Sums) -> bool:
-    """Move a model by a step; False if there is none."""
+def _advance(model: FloatArray, sums: _Sums) -> float:
+    """Move a model by a step, and give how far at its ends; infinity if there is none."""
     try:
         step = np.linalg.solve(sums.normal, sums.right)
     except np.linalg.LinAlgError:
-        return False
-    if not np.abs(step).max() < 0.5 * model[6]:
-        return False
+        return math.inf
+    size = float(np.abs(step).max())
+    if not size < 0.5 * model[6]:
+        return math.inf
     model[:3] += step[:2] @ sums.frame
     model[3:6] += step[2:4] @ sums.frame / sums.reach
     model[3:6] /= np.linalg.norm(model[3:6])
     model[6] += step[4]
-    return bool(model[6] > 0.0)
+    return size if model[6] > 0.0 else math.inf
 
 
 @njit(cache=True, nogil=True)
 def _count_residuals(
     points: FloatArray, model: FloatArray, low: float, high: float, width: float, counts: FloatArray
 ) -> None:
+    """Count absolute residuals in equal steps up to `width`, which the entries stand in the middle of."""
     for i in range(len(points)):
         z, square = 0.0, 0.0
         for d in range(3):
@@ -262,7 +270,11 @@ def _count_residuals(
             square += offset * offset
         residual = abs(math.sqrt(max(square - z * z, 0.0)) - model[6])
         if low <= z <= high and residual < width:
-            counts[int(residual / width * len(counts))] += 1.0
+            # shared by the two nearest steps, so that rounding chooses nothing
+            place = max(0.0, residual / width * len(counts) - 0.5)
+            k = int(place)
+            counts[k] += 1.0 - (place - k)
+            counts[min(k + 1, len(counts) - 1)] += place - k
 
 
 @njit(cache=True, nogil=True)

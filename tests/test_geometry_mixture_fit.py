@@ -1,0 +1,170 @@
+"""The maximum-likelihood fit: at the bound whatever share scatters widely, and as uncertain as it says."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from cylx.geometry.cylinder import axis_frame
+from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
+from cylx.geometry.mixture_fit import BINS, Law, estimate_law, fit_mixture
+
+UNIT = np.array([0.0, 0, 0, 0, 0, 1, 1])
+CHI_5_95, CHI_2_95 = 11.07, 5.991
+laws = settings(max_examples=20, deadline=None)
+
+
+def sample(rng, n, *, theta_deg=360.0, sigma=0.01, share=0.0, broad=0.04):
+    """Give points of the unit cylinder about the z axis, some of which scatter more, with angles and heights."""
+    angles, heights = np.radians(theta_deg) * (rng.random(n) - 0.5), 3.0 * (rng.random(n) - 0.5)
+    points = np.column_stack([np.cos(angles), np.sin(angles), heights])
+    scatter = np.where(rng.random(n) < share, broad, sigma)
+    return points + scatter[:, None] * rng.standard_normal((n, 3)), angles, heights
+
+
+def fitted(points, start=UNIT, sigma=0.01):
+    return fit_mixture(points, start, low=-2.0, high=2.0, width=8.0 * sigma, deviation=sigma)
+
+
+def errors(fit, truth=UNIT):
+    """Give how far the true cylinder is off, in the frame of the fit: two offsets, two tilts, radius."""
+    frame = np.array(axis_frame(fit.model[3:6]))
+    direction = truth[3:6] * np.sign(truth[3:6] @ fit.model[3:6])
+    direction = direction / (direction @ fit.model[3:6])
+    away = truth[:3] - fit.model[:3]
+    away = away - (away @ fit.model[3:6]) * direction
+    return np.array([*(frame @ away), *(frame @ (direction - fit.model[3:6])), truth[6] - fit.model[6]])
+
+
+def bound(angles, heights, sigma):
+    cosine, sine = np.cos(angles), np.sin(angles)
+    rows = np.column_stack([cosine, sine, heights * cosine, heights * sine, np.ones_like(angles)])
+    return sigma**2 * np.linalg.inv(rows.T @ rows)
+
+
+@pytest.mark.parametrize("theta_deg", [360.0, 135.0, 50.0])
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_errors_are_as_large_as_the_covariance_says(theta_deg, share):
+    rng = np.random.default_rng(int(theta_deg) + int(10 * share))
+    squares, radii = [], []
+    for _ in range(150):
+        fit = fitted(sample(rng, 1500, theta_deg=theta_deg, share=share)[0])
+        error = errors(fit)
+        squares.append(error @ np.linalg.solve(fit.covariance, error))
+        radii.append(error[4] ** 2 / fit.covariance[4, 4])
+    # 95 % of 150 are 142.5, with a standard deviation of 2.7
+    assert 133 <= np.sum(np.array(squares) < CHI_5_95) <= 150
+    assert 133 <= np.sum(np.array(radii) < 1.96**2) <= 150
+    assert np.mean(squares) == pytest.approx(5.0, abs=1.3)
+
+
+def test_the_bound_is_reached_where_a_third_scatters_widely():
+    rng = np.random.default_rng(3)
+    # what is known of the location of 0.7 N(0, 0.01) + 0.3 N(0, 0.04), against points that all scatter by 0.01
+    information = 0.52
+    found, least = [], []
+    for _ in range(60):
+        points, angles, heights = sample(rng, 2000, share=0.3)
+        found.append(errors(fitted(points)) ** 2)
+        least.append(np.diag(bound(angles, heights, 0.01)) / information)
+    ratio = np.sqrt(np.mean(found, axis=0) / np.mean(least, axis=0))
+    assert (ratio < 1.3).all()
+    assert ratio.mean() == pytest.approx(1.0, abs=0.12)
+
+
+@laws
+@given(st.integers(0, 2**32 - 1), st.floats(60, 360))
+def test_exact_points_give_the_exact_cylinder(seed, theta_deg):
+    points, _, _ = sample(np.random.default_rng(seed), 200, theta_deg=theta_deg, sigma=0.0)
+    fit = fit_mixture(points, UNIT, low=-2.0, high=2.0, width=1e-6, deviation=1e-9)
+    assert np.abs(errors(fit)).max() < 1e-9
+
+
+@laws
+@given(st.integers(0, 2**32 - 1), st.floats(1e-3, 1e3))
+def test_turned_moved_and_scaled_alike(seed, scale):
+    rng = np.random.default_rng(seed)
+    points, _, _ = sample(rng, 400, theta_deg=200.0, share=0.2)
+    plain = fitted(points)
+    turn, shift = Rotation.random(rng=rng), rng.uniform(-5, 5, 3)
+    start = np.concatenate([scale * (turn.apply(UNIT[:3]) + shift), turn.apply(UNIT[3:6]), [scale]])
+    other = fit_mixture(
+        scale * (turn.apply(points) + shift),
+        start,
+        low=-2 * scale,
+        high=2 * scale,
+        width=0.08 * scale,
+        deviation=0.01 * scale,
+    )
+    expected = np.concatenate(
+        [scale * (turn.apply(plain.model[:3]) + shift), turn.apply(plain.model[3:6]), [scale * plain.model[6]]]
+    )
+    assert np.abs(errors(other, expected)[[0, 1, 4]]).max() < 1e-6 * scale
+    assert np.abs(errors(other, expected)[2:4]).max() < 1e-6
+    units = np.array([scale, scale, 1, 1, scale])
+    frame = turn.apply(np.array(axis_frame(plain.model[3:6])))
+    mixing = np.array(axis_frame(other.model[3:6])) @ frame.T
+    whole = np.zeros((5, 5))
+    whole[:2, :2], whole[2:4, 2:4], whole[4, 4] = mixing, mixing, 1.0
+    assert other.covariance == pytest.approx(
+        whole @ plain.covariance @ whole.T * np.outer(units, units), rel=1e-3, abs=1e-9 * scale**2
+    )
+
+
+def test_a_neighbour_on_one_side_does_not_pull():
+    shifts, pulled = [], []
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        points, _, _ = sample(rng, 3000, theta_deg=180.0)
+        # a wall that begins just outside the surface, on one side
+        wall = np.column_stack([np.full(600, 1.05), rng.uniform(-0.2, 0.2, 600), rng.uniform(-1.5, 1.5, 600)])
+        both = np.concatenate([points, wall + 0.01 * rng.standard_normal(wall.shape)])
+        kernel = Kernel(0.08, 0.03, 1.0, TUKEY * TUKEY_SPREAD)
+        robust, _ = fit_cylinder(both, UNIT, low=-2.0, high=2.0, kernel=kernel, steps=60)
+        alone = fitted(points)
+        deviations = np.sqrt(np.diag(alone.covariance))
+        shifts.append(np.abs(errors(fitted(both, robust)) - errors(alone)) / deviations)
+        pulled.append(np.abs(errors(alone._replace(model=robust)) - errors(alone)) / deviations)
+    assert np.max(np.median(shifts, axis=0)) < 1.0
+    assert np.max(np.median(pulled, axis=0)) > 10.0
+
+
+def test_too_few_points_give_nothing():
+    rng = np.random.default_rng(6)
+    assert fitted(sample(rng, 8)[0]) is None
+    assert fitted(np.empty((0, 3))) is None
+    assert fitted(np.tile([1.0, 0.0, 0.0], (50, 1))) is None
+
+
+@pytest.mark.parametrize(("sigma", "broad", "share"), [(0.01, 0.04, 0.3), (0.01, 0.05, 0.5), (0.005, 0.03, 0.05)])
+def test_the_law_of_residuals_is_found(sigma, broad, share):
+    rng = np.random.default_rng(7)
+    residuals = rng.standard_normal(50000) * np.where(rng.random(50000) < share, broad, sigma)
+    width = 6.0 * broad
+    counts, _ = np.histogram(np.abs(residuals), BINS, (0.0, width))
+    law = estimate_law(counts.astype(float), width, Law(2 * sigma, 5 * sigma, 0.1))
+    assert law.deviation == pytest.approx(sigma, rel=0.05)
+    assert law.broad == pytest.approx(broad, rel=0.1)
+    assert law.share == pytest.approx(share, rel=0.15)
+
+
+def test_a_plain_law_has_no_outliers_to_speak_of():
+    residuals = np.abs(np.random.default_rng(8).standard_normal(20000))
+    counts, _ = np.histogram(residuals, BINS, (0.0, 8.0))
+    law = estimate_law(counts.astype(float), 8.0, Law(1.0, 3.0, 0.1))
+    assert law.deviation == pytest.approx(1.0, rel=0.02)
+    assert law.share < 0.1
+
+
+@pytest.mark.parametrize("outliers", [True, False])
+@pytest.mark.parametrize("law", [Law(1.0, 3.0, 0.2), Law(1.0, 1.0, 0.0), Law(0.5, 4.0, 0.6)])
+def test_the_tabulated_slope_is_the_derivative_of_the_score(law, outliers):
+    weight, slope, outer = law.weights(8.0, outliers=outliers).T
+    at = 8.0 * np.arange(BINS + 1) / BINS
+    numerical = np.gradient(weight * at, at)
+    assert slope[2:-2] == pytest.approx(numerical[2:-2], abs=0.02 * weight[0])
+    assert (weight >= 0).all()
+    assert (outer >= 0).all()
+    if not outliers and law.share:
+        assert weight[-1] < 1e-3 * weight[0]
