@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from cylx.geometry.cylinder import axis_frame
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
-from cylx.geometry.mixture_fit import BINS, Law, estimate_law, fit_mixture
+from cylx.geometry.mixture_fit import fit_mixture
+from cylx.geometry.residual_law import BINS, Law, estimate_law
 
 UNIT = np.array([0.0, 0, 0, 0, 0, 1, 1])
 CHI_5_95, CHI_2_95 = 11.07, 5.991

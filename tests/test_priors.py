@@ -109,7 +109,7 @@ def test_what_leaves_the_range_in_the_last_fit_is_dropped(monkeypatch, can, move
     config = Config(scene=scene)
     before = extract_cylinders(PointCloud(can.points), config)
     assert len(before.cylinders) == 1
-    monkeypatch.setattr(turns, "refit", lambda s, *_, **__: Segment(moved(s.model), s.half, s.spread))
+    monkeypatch.setattr(turns, "finish", lambda s, *_, **__: Segment(moved(s.model), s.half, s.spread))
     after = extract_cylinders(PointCloud(can.points), config)
     assert after.cylinders == ()
     assert {stage.name: stage for stage in after.stages}["merging"].rejected == {reason: 1}

@@ -1,0 +1,98 @@
+"""How residuals scatter: a mixture of two Gaussians, one of a surface and a broader one of outliers.
+
+The mixture is estimated by expectation maximisation (Dempster, Laird and Rubin, JRSS B 39, 1977) from a histogram, so
+that its cost does not grow with the points.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+BINS = 240
+"""Steps of the residual in which its law and the weights are tabulated."""
+EM_STEPS = 40
+SETTLED = 1e-4
+"""The estimate ends when a variance changes by less than this share."""
+LEAST_RATIO = 1.3
+"""An outlier part that is hardly broader than the other cannot be told from it."""
+
+
+class Law(NamedTuple):
+    """How residuals scatter.
+
+    Parameters
+    ----------
+    deviation, broad : float
+        Standard deviations of the surface and of the outliers.
+    share : float
+        Of outliers among the points, in [0, 1).
+    """
+
+    def weights(self, width: float, *, outliers: bool) -> FloatArray:
+        """Tabulate what a residual weighs, shape (BINS + 1, 3), at equal steps of its absolute value up to `width`.
+
+        The columns are the weight, the derivative of the score (weight times residual), and what the outliers have in
+        the weight. Without `outliers`, what may be one weighs that much less, and nothing as an outlier.
+        """
+        squares = (width * np.arange(BINS + 1) / BINS) ** 2
+        narrow, broad = self.deviation**2, self.broad**2
+        outer = _posterior(squares, narrow, broad, self.share)
+        gain = 1.0 / broad if outliers else 0.0
+        weight = (1.0 - outer) / narrow + outer * gain
+        slope = weight - outer * (1.0 - outer) * squares * (1.0 / narrow - gain) * (1.0 / narrow - 1.0 / broad)
+        return np.column_stack([weight, slope, outer / broad])
+
+    deviation: float
+    broad: float
+    share: float
+
+
+def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:
+    """Estimate how residuals scatter by expectation maximisation.
+
+    Parameters
+    ----------
+    counts : ndarray of shape (BINS,)
+        How many there are, by absolute value, in equal steps up to `width`; they need not be whole.
+    width : float
+    start : Law
+
+    Returns
+    -------
+    Law
+        Without outliers if the other part would not be broader by `LEAST_RATIO`.
+    """
+    squares = (width * (np.arange(BINS) + 0.5) / BINS) ** 2
+    total, all_squares = float(counts.sum()), float(counts @ squares)
+    if total == 0.0:
+        return start
+    narrow, broad, share = start.deviation**2, start.broad**2, max(start.share, 0.02)
+    for _ in range(EM_STEPS):
+        outer = counts * _posterior(squares, narrow, broad, share)
+        mass, last = float(outer.sum()), narrow
+        share = mass / total
+        if mass < 1e-3 * total:
+            break
+        outer_squares = float(outer @ squares)
+        broad = outer_squares / mass
+        narrow = (all_squares - outer_squares) / max(total - mass, 1e-9 * total)
+        if abs(narrow - last) < SETTLED * narrow:
+            break
+    if share < 1e-3 or broad < LEAST_RATIO**2 * narrow:
+        everything = math.sqrt(all_squares / total)
+        return Law(everything, everything, 0.0)
+    return Law(math.sqrt(narrow), math.sqrt(broad), share)
+
+
+def _posterior(squares: FloatArray, narrow: float, broad: float, share: float) -> FloatArray:
+    """Give the probability that residuals of these squares are outliers, from the two variances."""
+    if share <= 0.0:
+        return np.zeros_like(squares)
+    ratio = (1.0 - share) / share * math.sqrt(broad / narrow)
+    return np.asarray(1.0 / (1.0 + ratio * np.exp(-0.5 * squares * (1.0 / narrow - 1.0 / broad))))
