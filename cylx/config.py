@@ -145,7 +145,7 @@ class AveragingConfig(Section):
     """From the candidates of a cluster to one cylinder."""
 
     max_iterations: Annotated[int, Field(ge=1)] = 20
-    """Most steps of the dual-quaternion blending."""
+    """Most steps of the dual-quaternion blending; where `refine` is on, its fit takes the place of it."""
     refine: bool = True
     """Fit the average to all its points in the cloud, and let it grow along its axis."""
     merge: bool = True

@@ -7,6 +7,7 @@ points. All stages work in it, which is why unit, origin and order of the points
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
@@ -196,25 +197,28 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
     rng = np.random.default_rng([config.seed, 1])
     spacing, dense, measured, patches = measure_surface(ordered, codes, unit, rng)
     noise = config.scene.noise or measured
-    sizes, deviations = noise_by_size(ordered, codes, unit, spacing, measured, rng)
-    dense *= (config.scene.spacing or spacing) / spacing
-    spacing = config.scene.spacing or spacing
-    scene = Scene(spacing, noise, float(np.linalg.norm(np.ptp(points, axis=0))))
-    window = max(config.candidates.window_spacings * dense, config.candidates.window_noises * noise) / spacing
-    # cells are powers of two of a voxel that puts about 6 x 6 points of a plane into the radius of the smallest window
-    voxel = window / 6.0
-    corner, side = cell_cube(points, 2.0**BITS * voxel * spacing)
-    ordered, side = (points[order] - corner) / spacing, side / spacing
-    level = max(0, min(BITS - 1, math.floor(math.log2(2.0**BITS * voxel / (side + voxel)))))
-    unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # of a cloud wider than 2^21 voxels they are coarser
-    codes = morton_codes(ordered, unit, side)
-    again = np.argsort(codes, kind="stable")
-    places, ratios = ordered[patches.middles], patches.deviations / measured
-    cell, cells, factors = noise_by_place(places, ratios, side)
-    keys = cell_keys(cells)
-    by_key = np.argsort(keys)
+    with ThreadPoolExecutor(1) as pool:  # the noise over larger pieces is measured while the points are put in order
+        measuring = pool.submit(noise_by_size, ordered, codes, unit, spacing, measured, rng)
+        dense *= (config.scene.spacing or spacing) / spacing
+        spacing = config.scene.spacing or spacing
+        scene = Scene(spacing, noise, float(np.linalg.norm(np.ptp(points, axis=0))))
+        window = max(config.candidates.window_spacings * dense, config.candidates.window_noises * noise) / spacing
+        # cells are powers of two of a voxel that puts 6 x 6 points of a plane into the radius of the smallest window
+        voxel = window / 6.0
+        corner, side = cell_cube(points, 2.0**BITS * voxel * spacing)
+        ordered, side = (points[order] - corner) / spacing, side / spacing
+        level = max(0, min(BITS - 1, math.floor(math.log2(2.0**BITS * voxel / (side + voxel)))))
+        unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # of a cloud wider than 2^21 voxels they are coarser
+        codes = morton_codes(ordered, unit, side)
+        again = np.argsort(codes, kind="stable")
+        places, ratios = ordered[patches.middles], patches.deviations / measured
+        cell, cells, factors = noise_by_place(places, ratios, side)
+        keys = cell_keys(cells)
+        by_key = np.argsort(keys)
+        inside = np.ascontiguousarray(ordered[again])
+        sizes, deviations = measuring.result()
     frame = Frame(
-        points=np.ascontiguousarray(ordered[again]),
+        points=inside,
         order=order[again],
         codes=codes[again],
         unit=unit,

@@ -33,7 +33,7 @@ def members(seed, spread, count=9):
 def average(models, weights, extent=0.5):
     count = len(models)
     candidates = Candidates(models, np.arange(count), np.full(count, extent), np.full(count, 30), np.ones(count))
-    return average_cluster(candidates, Cluster(np.arange(count), weights, 0.9), AveragingConfig())
+    return average_cluster(candidates, Cluster(np.arange(count), weights, 0.9), AveragingConfig(refine=False))
 
 
 def axis_apart(one, other):

@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
@@ -69,25 +70,37 @@ def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:
         Without outliers if the other part would not be broader by `LEAST_RATIO`.
     """
     squares = (width * (np.arange(BINS) + 0.5) / BINS) ** 2
-    total, all_squares = float(counts.sum()), float(counts @ squares)
+    total = float(counts.sum())
     if total == 0.0:
         return start
-    narrow, broad, share = start.deviation**2, start.broad**2, max(start.share, 0.02)
-    for _ in range(EM_STEPS):
-        outer = counts * _posterior(squares, narrow, broad, share)
-        mass, last = float(outer.sum()), narrow
-        share = mass / total
-        if mass < 1e-3 * total:
-            break
-        outer_squares = float(outer @ squares)
-        broad = outer_squares / mass
-        narrow = (all_squares - outer_squares) / max(total - mass, 1e-9 * total)
-        if abs(narrow - last) < SETTLED * narrow:
-            break
+    narrow, broad, share = _maximise(squares, counts, total, start.deviation**2, start.broad**2, max(start.share, 0.02))
     if share < 1e-3 or broad < LEAST_RATIO**2 * narrow:
-        everything = math.sqrt(all_squares / total)
+        everything = math.sqrt(float(counts @ squares) / total)
         return Law(everything, everything, 0.0)
     return Law(math.sqrt(narrow), math.sqrt(broad), share)
+
+
+@njit(cache=True, nogil=True)
+def _maximise(
+    squares: FloatArray, counts: FloatArray, total: float, narrow: float, broad: float, share: float
+) -> tuple[float, float, float]:
+    """Climb from these variances and this share of outliers to those that make the counts most likely."""
+    for _ in range(EM_STEPS):
+        # the odds that a residual of this square is none
+        ratio, rate = (1.0 - share) / share * math.sqrt(broad / narrow), 0.5 * (1.0 / narrow - 1.0 / broad)
+        mass, outside, inside = 0.0, 0.0, 0.0
+        for i in range(len(counts)):
+            outer = counts[i] / (1.0 + ratio * math.exp(-rate * squares[i]))
+            mass += outer
+            outside += outer * squares[i]
+            inside += (counts[i] - outer) * squares[i]
+        share, last = mass / total, narrow
+        if share < 1e-3:
+            break
+        broad, narrow = outside / mass, inside / max(total - mass, 1e-9 * total)
+        if abs(narrow - last) < SETTLED * narrow:
+            break
+    return narrow, broad, share
 
 
 def _posterior(squares: FloatArray, narrow: float, broad: float, share: float) -> FloatArray:

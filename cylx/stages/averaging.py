@@ -41,6 +41,9 @@ LEAST_COSINE = math.cos(math.radians(25.0))
 def average_cluster(candidates: Candidates, cluster: Cluster, config: AveragingConfig) -> Segment:
     """Average the candidates of a cluster: eq. 8 for the radius, dual-quaternion iterative blending for the axis.
 
+    What is refined afterwards is not blended: the weighted mean of points and directions, which agrees to first order,
+    is as good a start.
+
     Parameters
     ----------
     candidates : Candidates
@@ -60,11 +63,13 @@ def average_cluster(candidates: Candidates, cluster: Cluster, config: AveragingC
     origin = weights @ points
     direction = weights @ directions
     direction /= np.linalg.norm(direction)
-    motions, _, _ = line_screws(np.zeros(3), direction, points - origin, directions)
-    motion = blend(motions, weights, config.max_iterations)
-    axis = turn_vectors(motion, direction)
-    axis /= np.linalg.norm(axis)
-    point = move_points(motion, np.zeros(3)) + origin
+    point, axis = origin, direction
+    if not config.refine:  # a fit to the points sets out from here as well as from the blend of all screws
+        motions, _, _ = line_screws(np.zeros(3), direction, points - origin, directions)
+        motion = blend(motions, weights, config.max_iterations)
+        axis = turn_vectors(motion, direction)
+        axis /= np.linalg.norm(axis)
+        point = move_points(motion, np.zeros(3)) + origin
     heights = (points - point) @ axis
     margin = 0.4 * float(np.median(candidates.extents[cluster.members]))
     low, high = float(heights.min()) - margin, float(heights.max()) + margin
