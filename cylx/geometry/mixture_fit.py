@@ -24,6 +24,7 @@ ROUNDS, STEPS = 3, 5
 CLOSE = 1e-4
 """Steps end when one is shorter than this share of the deviation."""
 LEAST_POINTS = 12
+_LOWER = np.tril_indices(5, -1)
 ONE_SIDED = 25.0
 """Chi-square of five degrees of freedom beyond which the outliers lie to one side, and tell nothing of the surface."""
 
@@ -134,9 +135,8 @@ class _Sums:
         vectors = np.zeros((3, 5))
         fill_frame(model[3:6], self.frame)
         _fill_sums(points, model, self.frame, low, high, width, self.reach, weights, full, matrices, vectors)
-        lower = np.tril_indices(5, -1)
         for matrix in matrices:
-            matrix[lower[1], lower[0]] = matrix[lower]
+            matrix[_LOWER[1], _LOWER[0]] = matrix[_LOWER]
         self.normal, self.slopes, self.scores, self.outer_scores = matrices
         self.right, self.outer_right = vectors[:2]
         self.count, self.weight = float(vectors[2, 0]), float(vectors[2, 1])
