@@ -29,6 +29,8 @@ def extract(
     planes: int | None = None,
     axis: Sequence[float] | str | None = None,
     axis_tolerance_deg: float | None = None,
+    axis_sd_deg: float | None = None,
+    known_radius: tuple[float, float | None] | None = None,
     min_coverage_deg: float | None = None,
     threads: int | None = None,
     observer: Observer | None = None,
@@ -57,6 +59,11 @@ def extract(
         Direction of the cylinders looked for: three numbers, or `x`, `y` or `z`; length and sign do not matter.
     axis_tolerance_deg : float, optional
         Largest angle of a cylinder to `axis`, degrees; 10 by default.
+    axis_sd_deg : float, optional
+        Standard deviation of the cylinders' tilts from `axis`, degrees: each fit is drawn to it.
+    known_radius : pair of float, optional
+        Radius that the cylinders are known to have, in the unit of the points, and its standard deviation (None: a
+        thousandth of it): each fit is drawn to it that does not contradict it.
     min_coverage_deg : float, optional
         Smallest angle about its axis that must be seen of a cylinder, degrees.
     threads : int, optional
@@ -92,6 +99,8 @@ def extract(
         planes=planes,
         axis=axis,
         axis_tolerance_deg=axis_tolerance_deg,
+        axis_sd_deg=axis_sd_deg,
+        known_radius=known_radius,
         min_coverage_deg=min_coverage_deg,
     )
     settings = load_config(

@@ -43,6 +43,12 @@ class SceneConfig(Section):
     """Direction of the cylinders looked for, in the coordinates of the scan; its length and sign do not matter."""
     axis_tolerance_deg: Annotated[Number, Field(gt=0, le=90)] = 10.0
     """Largest angle of a cylinder to `axis`, degrees; means nothing without it."""
+    axis_sd_deg: Annotated[Number, Field(gt=0, le=90)] | None = None
+    """Standard deviation of the cylinders' tilts from `axis`, degrees: each fit is drawn to it; null draws none."""
+    known_radius: Positive | None = None
+    """Radius the cylinders are known to have, scene units: each fit is drawn to it that does not contradict it."""
+    known_radius_sd: Positive | None = None
+    """Standard deviation of `known_radius`, scene units; null is a thousandth of it."""
 
     @model_validator(mode="after")
     def _check_axis(self) -> SceneConfig:
@@ -246,7 +252,20 @@ def load_config(
     merged = preset_layer(names[-1] if names else "auto").values
     for layer in given:
         merged = merge(merged, layer.values)
-    return _validate(merged, given)
+    config = _validate(merged, given)
+    _check_known(config.scene)
+    return config
+
+
+def _check_known(scene: SceneConfig) -> None:
+    """Refuse a deviation of what is not known; layers, which are validated by themselves, may have it apart."""
+    pairs = {
+        "known_radius_sd": (scene.known_radius_sd, scene.known_radius, "known_radius"),
+        "axis_sd_deg": (scene.axis_sd_deg, scene.axis, "axis"),
+    }
+    for name, (deviation, value, needed) in pairs.items():
+        if deviation is not None and value is None:
+            raise ConfigError(f"scene.{name}", f"is given without scene.{needed}", "give that, too")
 
 
 def check_tolerance(config: Config, options: Mapping[str, object]) -> None:

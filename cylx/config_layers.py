@@ -78,6 +78,8 @@ def named_options(
     planes: int | None = None,
     axis: Sequence[float] | str | None = None,
     axis_tolerance_deg: float | None = None,
+    axis_sd_deg: float | None = None,
+    known_radius: tuple[float, float | None] | None = None,
     min_coverage_deg: float | None = None,
 ) -> dict[str, object]:
     """Give the dotted keys that the named options of the command line and of `cylx.extract` stand for.
@@ -92,6 +94,10 @@ def named_options(
         Direction of the cylinders, three numbers, or `x`, `y` or `z`.
     axis_tolerance_deg : float, optional
         Largest angle of a cylinder to the axis, degrees.
+    axis_sd_deg : float, optional
+        Standard deviation of the cylinders' tilts from the axis, degrees.
+    known_radius : pair of float, optional
+        Radius that the cylinders are known to have, and its standard deviation or None, scene units.
     min_coverage_deg : float, optional
         Smallest angle about the axis that must be covered, degrees.
 
@@ -101,6 +107,7 @@ def named_options(
         The options that were given, for `load_config`.
     """
     smallest, largest = radius or (None, None)
+    known, known_sd = known_radius or (None, None)
     values = {
         "seed": seed,
         "max_cylinders": max_cylinders,
@@ -109,6 +116,9 @@ def named_options(
         "scene.radius_max": largest,
         "scene.axis": None if axis is None else _axis(axis),
         "scene.axis_tolerance_deg": axis_tolerance_deg,
+        "scene.axis_sd_deg": axis_sd_deg,
+        "scene.known_radius": known,
+        "scene.known_radius_sd": known_sd,
         "verification.min_coverage_deg": min_coverage_deg,
     }
     return {key: value for key, value in values.items() if value is not None}

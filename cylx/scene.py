@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.errors import InputError
+from cylx.geometry.mixture_fit import Prior
 from cylx.geometry.morton import BITS, morton_codes
 from cylx.noise import measure_surface, noise_by_place, noise_by_size
 from cylx.records import Frame, Noise, Scene, cell_keys
@@ -250,7 +251,7 @@ def resolve(config: Config, scene: Scene) -> Config:
     -------
     Config
     """
-    least, greatest = config.scene.radius_min, config.scene.radius_max
+    least, greatest, radius = config.scene.radius_min, config.scene.radius_max, config.scene.known_radius
     thickness = config.slicing.thickness or 2.0 * max(scene.spacing, 2.0 * scene.noise)
     known = {
         "scene": {
@@ -258,6 +259,7 @@ def resolve(config: Config, scene: Scene) -> Config:
             "noise": scene.noise,
             "radius_min": least or min(max(3.0 * scene.noise, 0.25 * scene.spacing), greatest or math.inf),
             "radius_max": greatest or max(0.5 * scene.extent, least or 0.0),
+            "known_radius_sd": config.scene.known_radius_sd or (radius and 1e-3 * radius),
         },
         "slicing": {"thickness": thickness},
         "ellipses": {"tolerance": config.ellipses.tolerance or 4.0 * scene.noise + 0.06 * thickness},
@@ -271,3 +273,17 @@ def radius_range(config: Config, frame: Frame) -> tuple[float, float]:
     """Give the least and the greatest radius looked for in frame units, from a resolved configuration."""
     low, high = config.scene.radius_min, config.scene.radius_max
     return (low or 0.0) / frame.spacing, (high or math.inf) / frame.spacing
+
+
+def known_of(config: Config, frame: Frame) -> Prior | None:
+    """Give what is known of each cylinder in frame units, from a resolved configuration; None if nothing is."""
+    scene = config.scene
+    drawn = scene.axis is not None and scene.axis_sd_deg is not None
+    if scene.known_radius is None and not drawn:
+        return None
+    radius = None if scene.known_radius is None else scene.known_radius / frame.spacing
+    deviation = (scene.known_radius_sd or math.inf) / frame.spacing
+    axis = np.array(scene.axis, dtype=np.float64) if drawn else None
+    return Prior(
+        radius, deviation, None if axis is None else axis / np.linalg.norm(axis), math.radians(scene.axis_sd_deg or 0.0)
+    )

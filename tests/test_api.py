@@ -55,7 +55,8 @@ def test_rows_that_are_not_finite_stay_rows(asked):
 def test_options_are_those_of_the_command(asked, tmp_path):
     (tmp_path / "my.yaml").write_text("preset: paper\nslicing: {min_points: 9}")
     options = {"seed": 3, "radius": (None, 2.0), "max_cylinders": 4, "planes": 7, "overrides": ["slicing.thickness=1"]}
-    options |= {"axis": "y", "axis_tolerance_deg": 5.0, "min_coverage_deg": 60}
+    options |= {"axis": "y", "axis_tolerance_deg": 5.0, "axis_sd_deg": 0.5, "min_coverage_deg": 60}
+    options |= {"known_radius": (1.5, 0.01)}
     cylx.extract([[0, 0, 0]], config=tmp_path / "my.yaml", threads=2, **options)
     expected = load_config(
         preset="paper",
@@ -67,6 +68,9 @@ def test_options_are_those_of_the_command(asked, tmp_path):
             "slicing.planes": 7,
             "scene.axis": [0, 1, 0],
             "scene.axis_tolerance_deg": 5,
+            "scene.axis_sd_deg": 0.5,
+            "scene.known_radius": 1.5,
+            "scene.known_radius_sd": 0.01,
             "verification.min_coverage_deg": 60,
         },
     )

@@ -283,12 +283,15 @@ def test_rejected_of_several_scans_goes_into_a_folder(run_cylx, scans, tmp_path,
 
 
 def test_what_is_known_reaches_the_pipeline(run_cylx, scan, fake_pipeline):
-    options = ["--axis", "0,-2,1", "--axis-tolerance", 5, "--min-coverage", 60, "-o", "-"]
+    options = ["--axis", "0,-2,1", "--axis-tolerance", 5, "--axis-sd", 0.5, "--min-coverage", 60, "-o", "-"]
+    options += ["--known-radius", "0.5:0.01"]
     assert run_cylx("extract", scan, *options).exit_code == 0
-    assert run_cylx("extract", scan, "--axis", "y", "-o", "-").exit_code == 0
+    assert run_cylx("extract", scan, "--axis", "y", "--known-radius", "0.5", "-o", "-").exit_code == 0
     (_, config, _), (_, other, _) = fake_pipeline.calls
     assert (config.scene.axis, config.scene.axis_tolerance_deg) == ([0, -2, 1], 5)
     assert config.verification.min_coverage_deg == 60
+    assert (config.scene.axis_sd_deg, config.scene.known_radius, config.scene.known_radius_sd) == (0.5, 0.5, 0.01)
+    assert (other.scene.axis_sd_deg, other.scene.known_radius, other.scene.known_radius_sd) == (None, 0.5, None)
     assert (other.scene.axis, other.scene.axis_tolerance_deg) == ([0, 1, 0], 10)
 
 

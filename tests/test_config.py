@@ -97,6 +97,11 @@ def test_named_options_leave_out_what_was_not_given():
         "slicing.planes": 0,
         "scene.radius_min": 1.0,
     }
+    assert named_options(axis_sd_deg=0.1, known_radius=(0.5, None)) == {
+        "scene.axis_sd_deg": 0.1,
+        "scene.known_radius": 0.5,
+    }
+    assert named_options(known_radius=(0.5, 0.01)) == {"scene.known_radius": 0.5, "scene.known_radius_sd": 0.01}
     assert named_options(axis=(0, -1, 0), axis_tolerance_deg=5, min_coverage_deg=0) == {
         "scene.axis": [0, -1, 0],
         "scene.axis_tolerance_deg": 5,
@@ -213,6 +218,9 @@ REFUSED = [
         "my.yaml: scene.axis.2: '.inf' is not a number; write a number such as 0.05",
     ),
     ("scene: {axis_tolerance_deg: 0}", "my.yaml: scene.axis_tolerance_deg: 0 is out of range; it must be > 0"),
+    ("scene: {axis_sd_deg: 1}", "scene.axis_sd_deg: is given without scene.axis; give that, too"),
+    ("scene: {known_radius_sd: 1}", "scene.known_radius_sd: is given without scene.known_radius; give that, too"),
+    ("scene: {known_radius: 0}", "my.yaml: scene.known_radius: 0 is out of range; it must be > 0"),
     ("scene: {axis_tolerance_deg: 91}", "my.yaml: scene.axis_tolerance_deg: 91 is out of range; it must be <= 90"),
     ("- a\n- b", "my.yaml: has no keys at its top level; write 'section:' and its keys below it"),
     ("seed", "my.yaml: has no keys at its top level; write 'section:' and its keys below it"),

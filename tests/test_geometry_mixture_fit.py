@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cylx.geometry.cylinder import axis_frame
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
-from cylx.geometry.mixture_fit import fit_mixture
+from cylx.geometry.mixture_fit import Prior, fit_mixture
 from cylx.geometry.residual_law import BINS, Law, estimate_law
 
 UNIT = np.array([0.0, 0, 0, 0, 0, 1, 1])
@@ -24,8 +24,8 @@ def sample(rng, n, *, theta_deg=360.0, sigma=0.01, share=0.0, broad=0.04):
     return points + scatter[:, None] * rng.standard_normal((n, 3)), angles, heights
 
 
-def fitted(points, start=UNIT, sigma=0.01):
-    return fit_mixture(points, start, low=-2.0, high=2.0, width=8.0 * sigma, deviation=sigma)
+def fitted(points, start=UNIT, sigma=0.01, prior=None):
+    return fit_mixture(points, start, low=-2.0, high=2.0, width=8.0 * sigma, deviation=sigma, prior=prior)
 
 
 def errors(fit, truth=UNIT):
@@ -169,3 +169,63 @@ def test_the_tabulated_slope_is_the_derivative_of_the_score(law, outliers):
     assert (outer >= 0).all()
     if not outliers and law.share:
         assert weight[-1] < 1e-3 * weight[0]
+
+
+def test_a_known_radius_wins_ten_times_at_a_right_angle():
+    rng = np.random.default_rng(10)
+    free, drawn, held = [], [], []
+    for _ in range(40):
+        points, _, _ = sample(rng, 1000, theta_deg=90.0)
+        one, other = fitted(points), fitted(points, prior=Prior(radius=1.0, radius_deviation=1e-6))
+        # towards the viewer, which is along x, whatever the frame
+        free.append(errors(one)[:2] @ np.array(axis_frame(one.model[3:6]))[:, 0])
+        drawn.append(errors(other)[:2] @ np.array(axis_frame(other.model[3:6]))[:, 0])
+        error = errors(other)[:2]
+        held.append(error @ np.linalg.solve(other.covariance[:2, :2], error) < CHI_2_95)
+        assert other.model[6] == pytest.approx(1.0, abs=1e-5)
+        assert other.covariance[4, 4] == pytest.approx(1e-12, rel=1e-3)
+    # the bound says 10.3
+    assert np.sqrt(np.mean(np.square(free)) / np.mean(np.square(drawn))) == pytest.approx(10.3, rel=0.4)
+    assert np.mean(held) > 0.85
+
+
+def test_a_known_direction_draws_the_tilts_alone():
+    points, _, _ = sample(np.random.default_rng(11), 800, theta_deg=120.0)
+    known = Prior(direction=np.array([0.0, 0.0, -1.0]), direction_deviation=1e-7)
+    free, drawn = fitted(points), fitted(points, prior=known)
+    assert np.linalg.norm(drawn.model[3:5]) < 1e-5 < np.linalg.norm(free.model[3:5])
+    assert np.sqrt(np.diag(drawn.covariance)[2:4]) == pytest.approx([1e-7, 1e-7], rel=0.01)
+    assert drawn.model[6] == pytest.approx(free.model[6], abs=np.sqrt(free.covariance[4, 4]))
+
+
+@pytest.mark.parametrize("prior", [Prior(), Prior(1.01, 1e6), Prior(direction=UNIT[3:6], direction_deviation=1e3)])
+def test_a_prior_that_knows_nothing_changes_nothing(prior):
+    points, _, _ = sample(np.random.default_rng(12), 800, theta_deg=150.0)
+    free, drawn = fitted(points), fitted(points, prior=prior)
+    assert drawn.model == pytest.approx(free.model, abs=1e-9)
+    assert drawn.covariance == pytest.approx(free.covariance, rel=1e-5, abs=1e-15)
+
+
+def test_priors_of_the_right_width_are_as_certain_as_they_say():
+    rng = np.random.default_rng(13)
+    squares = []
+    for _ in range(120):
+        points, _, _ = sample(rng, 600, theta_deg=120.0)
+        tilts = 0.001 * rng.standard_normal(2)
+        known = Prior(1.0 + 0.001 * rng.standard_normal(), 0.001, np.array([*tilts, 1.0]), 0.001)
+        fit = fitted(points, prior=known)
+        error = errors(fit)
+        squares.append(error @ np.linalg.solve(fit.covariance, error))
+    assert 105 <= np.sum(np.array(squares) < CHI_5_95) <= 120
+    assert np.mean(squares) == pytest.approx(5.0, abs=1.4)
+
+
+def test_what_the_points_contradict_is_left_out():
+    points, _, _ = sample(np.random.default_rng(14), 2000)
+    free = fitted(points)
+    wrong = Prior(1.2, 0.001, np.array([0.1, 0.0, 1.0]) / np.hypot(0.1, 1.0), 0.001)
+    kept = wrong.as_far_as_borne_out(free)
+    assert (kept.radius, kept.direction) == (None, None)
+    right = Prior(1.0, 0.001, UNIT[3:6], 0.001)
+    assert right.as_far_as_borne_out(free) is right
+    assert wrong._replace(radius_deviation=0.1).as_far_as_borne_out(free).radius == 1.2

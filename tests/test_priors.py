@@ -136,3 +136,40 @@ def test_the_direction_is_in_the_configuration_that_finds_the_same_again(can):
     again = load_config(start=one.config)
     assert again.scene.axis == [0, 0, 2]
     assert Result.of(extract(can.points, config=again)).to_json() == Result.of(one).to_json()
+
+
+def test_a_known_radius_makes_the_axis_more_certain():
+    arc = single(points=2000, sigma=0.01, theta_deg=90, seed=3)
+    free, drawn = extract(arc.points), extract(arc.points, known_radius=(1.0, 1e-4))
+    (one,), (other,) = Result.of(free).cylinders, Result.of(drawn).cylinders
+    assert other.uncertainty.radius == pytest.approx(1e-4, rel=0.05)
+    assert one.uncertainty.axis_offset > 4 * other.uncertainty.axis_offset
+    true = arc.cylinders[0].cylinder
+    away = np.linalg.norm(np.cross(np.array(other.axis_point) - true.point, true.direction))
+    assert away < 3 * other.uncertainty.axis_offset
+
+
+def test_a_known_radius_follows_the_unit():
+    arc = single(points=2000, sigma=0.01, theta_deg=90, seed=4)
+    metres = extract(arc.points, known_radius=(1.0, 1e-3)).cylinders[0]
+    millimetres = extract(1000 * arc.points, known_radius=(1000.0, 1.0)).cylinders[0]
+    assert millimetres.cylinder.radius == pytest.approx(1000 * metres.cylinder.radius, rel=1e-7)
+    units = np.array([1000, 1000, 1, 1, 1000])
+    assert millimetres.covariance == pytest.approx(metres.covariance * np.outer(units, units), rel=1e-4)
+
+
+def test_only_what_has_the_known_radius_is_drawn_to_it():
+    free, drawn = (extract(SAMPLE_DATA / "pipes.ply", known_radius=known) for known in (None, (0.151, 2e-5)))
+    radii = [np.array([fit.cylinder.radius for fit in found.cylinders]) for found in (free, drawn)]
+    near = np.abs(radii[0] - 0.151) < 1e-4
+    assert near.sum() == 1
+    assert radii[1][~near] == pytest.approx(radii[0][~near], rel=1e-9)
+    assert abs(radii[1][near][0] - 0.151) < abs(radii[0][near][0] - 0.151)
+
+
+def test_a_known_direction_makes_the_tilt_more_certain(can):
+    free, drawn = extract(can.points), extract(can.points, axis="z", axis_sd_deg=0.001)
+    assert angles_to(np.array([0, 0, 1.0]), drawn).max() < 0.005
+    (one,), (other,) = Result.of(free).cylinders, Result.of(drawn).cylinders
+    assert other.uncertainty.axis_angle_deg == pytest.approx(0.001 * np.sqrt(2), rel=0.05)
+    assert one.uncertainty.axis_angle_deg > 5 * other.uncertainty.axis_angle_deg

@@ -16,6 +16,7 @@ from cylx.scene import (
     canonical_order,
     cell_cube,
     check_usable,
+    known_of,
     make_frame,
     measure_scene,
     radius_range,
@@ -262,7 +263,9 @@ def test_what_is_known_of_the_scene_is_not_measured(framed):
 def test_every_null_becomes_a_length(framed):
     _, frame, scene = framed
     config = resolve(Config(), scene)
-    assert None not in config.scene.model_dump(exclude={"axis"}).values()
+    assert (
+        None not in config.scene.model_dump(exclude={"axis", "axis_sd_deg", "known_radius", "known_radius_sd"}).values()
+    )
     assert config.slicing.thickness > 0
     assert config.ellipses.tolerance > 0
     assert (config.scene.spacing, config.scene.noise) == (scene.spacing, scene.noise)
@@ -270,6 +273,26 @@ def test_every_null_becomes_a_length(framed):
     assert 0 < low < high
     assert np.isclose(high * frame.spacing, config.scene.radius_max)
     assert resolve(config, scene) == config
+
+
+def test_a_known_radius_has_a_deviation(framed):
+    _, frame, scene = framed
+    for given_, expected in (
+        (["scene.known_radius=2"], 0.002),
+        (["scene.known_radius=2", "scene.known_radius_sd=0.1"], 0.1),
+    ):
+        config = resolve(load_config(overrides=given_), scene)
+        assert np.isclose(config.scene.known_radius_sd, expected)
+        known = known_of(config, frame)
+        assert np.allclose([known.radius, known.radius_deviation], np.array([2, expected]) / frame.spacing)
+        assert known.direction is None
+    config = resolve(load_config(overrides=["scene.axis=[0, 0, -2]", "scene.axis_sd_deg=0.5"]), scene)
+    known = known_of(config, frame)
+    assert known.radius is None
+    assert known.direction.tolist() == [0, 0, -1]
+    assert np.isclose(known.direction_deviation, np.radians(0.5))
+    for nothing in ([], ["scene.axis=[0, 0, 1]"]):
+        assert known_of(resolve(load_config(overrides=nothing), scene), frame) is None
 
 
 def test_lengths_follow_the_unit(framed):

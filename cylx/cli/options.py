@@ -24,6 +24,7 @@ from cylx.cli.failures import DEBUG
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Bounds = tuple[float | None, float | None]
+Known = tuple[float, float | None]
 
 PRESETS = ("auto", "paper")
 
@@ -32,9 +33,10 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
     BoundsType = click.ParamType[Bounds]
+    KnownType = click.ParamType[Known]
     VectorType = click.ParamType[tuple[float, ...]]
 else:
-    BoundsType = VectorType = click.ParamType  # not generic in older versions
+    BoundsType = KnownType = VectorType = click.ParamType  # not generic in older versions
 
 
 class RadiusRange(BoundsType):
@@ -65,6 +67,24 @@ class RadiusRange(BoundsType):
         if not 0 < radius < float("inf"):
             self.fail(f"'{side}' is not a radius; it must be > 0 and finite", param, ctx)
         return radius
+
+
+class KnownRadius(KnownType):
+    """`R`, or `R:SD`."""
+
+    name = "r[:sd]"
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Known:
+        """Read the radius and its standard deviation."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            numbers = [float(side) for side in str(value).split(":")]
+        except ValueError:
+            numbers = []
+        if len(numbers) not in {1, 2} or not all(0 < number < float("inf") for number in numbers):
+            self.fail(f"'{value}' is not R or R:SD in positive numbers, such as 0.05 or 0.05:0.001", param, ctx)
+        return numbers[0], numbers[1] if len(numbers) == 2 else None
 
 
 class Vector(VectorType):
@@ -123,6 +143,8 @@ def configured(command: Command) -> Command:
         planes: int | None,
         axis: tuple[float, ...] | None,
         axis_tolerance_deg: float | None,
+        axis_sd_deg: float | None,
+        known_radius: Known | None,
         min_coverage_deg: float | None,
         **others: object,
     ) -> object:
@@ -136,6 +158,8 @@ def configured(command: Command) -> Command:
             planes=planes,
             axis=axis,
             axis_tolerance_deg=axis_tolerance_deg,
+            axis_sd_deg=axis_sd_deg,
+            known_radius=known_radius,
             min_coverage_deg=min_coverage_deg,
         )
         settings = load_config(path=config, preset=preset, overrides=overrides, options=options)
@@ -175,6 +199,18 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
         type=click.FloatRange(0, 90, min_open=True),
         metavar="DEG",
         help="Largest angle of a cylinder to --axis, degrees.  [default: 10]",
+    ),
+    click.option(
+        "--axis-sd",
+        "axis_sd_deg",
+        type=click.FloatRange(0, 90, min_open=True),
+        metavar="DEG",
+        help="Draw the directions to --axis, from which they are known to tilt by about so many degrees.",
+    ),
+    click.option(
+        "--known-radius",
+        type=KnownRadius(),
+        help="Draw the radii to this one, known with a standard deviation SD.  [default: SD a thousandth]",
     ),
     click.option(
         "--min-coverage",

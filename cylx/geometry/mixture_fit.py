@@ -24,6 +24,8 @@ ROUNDS, STEPS = 3, 5
 CLOSE = 1e-4
 """Steps end when one is shorter than this share of the deviation."""
 LEAST_POINTS = 12
+CONTRADICTION = 5.0
+"""What is known and what the points say may differ by so many standard deviations."""
 _LOWER = np.tril_indices(5, -1)
 ONE_SIDED = 25.0
 """Chi-square of five degrees of freedom beyond which the outliers lie to one side, and tell nothing of the surface."""
@@ -47,8 +49,51 @@ class MixtureFit(NamedTuple):
     law: Law
 
 
+class Prior(NamedTuple):
+    """What is known of a cylinder before its points are looked at, as Gaussians.
+
+    Parameters
+    ----------
+    radius : float or None
+        None if nothing is known of it.
+    radius_deviation : float
+    direction : ndarray of shape (3,) or None
+        Unit direction of the axis, either way; None if nothing is known of it.
+    direction_deviation : float
+        Of each of the two tilts, radians.
+    """
+
+    radius: float | None = None
+    radius_deviation: float = math.inf
+    direction: FloatArray | None = None
+    direction_deviation: float = math.inf
+
+    def as_far_as_borne_out(self, fit: MixtureFit) -> Prior:
+        """Leave out what a fit without it contradicts, by `CONTRADICTION` standard deviations."""
+        covariance, kept = fit.covariance, self
+        if self.radius is not None:
+            away = fit.model[6] - self.radius
+            if away**2 > CONTRADICTION**2 * (covariance[4, 4] + self.radius_deviation**2):
+                kept = kept._replace(radius=None)
+        if self.direction is not None:
+            frame = np.empty((2, 3))
+            fill_frame(fit.model[3:6], frame)
+            tilts = frame @ self.direction * np.sign(self.direction @ fit.model[3:6])
+            spread = covariance[2:4, 2:4] + self.direction_deviation**2 * np.eye(2)
+            if tilts @ np.linalg.solve(spread, tilts) > CONTRADICTION**2:
+                kept = kept._replace(direction=None)
+        return kept
+
+
 def fit_mixture(
-    points: FloatArray, model: FloatArray, *, low: float, high: float, width: float, deviation: float
+    points: FloatArray,
+    model: FloatArray,
+    *,
+    low: float,
+    high: float,
+    width: float,
+    deviation: float,
+    prior: Prior | None = None,
 ) -> MixtureFit | None:
     """Fit a cylinder by maximum likelihood, starting from a robust fit.
 
@@ -63,6 +108,8 @@ def fit_mixture(
         Only points this near to the surface take part: a few deviations of the surface.
     deviation : float
         Standard deviation of the surface, to start with.
+    prior : Prior, optional
+        Makes of the likelihood a posterior: the fit is its mode.
 
     Returns
     -------
@@ -79,6 +126,8 @@ def fit_mixture(
         weights = law.weights(width, outliers=symmetric)
         for _ in range(STEPS):
             sums = _Sums.of(points, fitted, low, high, width, weights)
+            if prior is not None:
+                sums.know(prior, fitted)
             size = _advance(fitted, sums) if sums.count >= LEAST_POINTS else math.inf
             if not size < math.inf:
                 return None
@@ -88,6 +137,8 @@ def fit_mixture(
             full = _Sums.of(points, fitted, low, high, width, weights, full=True)
             symmetric = full.one_sidedness() < ONE_SIDED
     sums = _Sums.of(points, fitted, low, high, width, law.weights(width, outliers=symmetric), full=True)
+    if prior is not None:
+        sums.know(prior, fitted)
     covariance = sums.covariance()
     aside = np.linalg.norm(np.cross(fitted[:3] - model[:3], model[3:6]))
     if covariance is None or not abs(fitted[6] - model[6]) + aside < width:
@@ -141,6 +192,20 @@ class _Sums:
         self.right, self.outer_right = vectors[:2]
         self.count, self.weight = float(vectors[2, 0]), float(vectors[2, 1])
         return self
+
+    def know(self, prior: Prior, model: FloatArray) -> None:
+        """Add what is known to the normal equations: a pseudo-observation of the radius, one of each tilt."""
+        values, precisions = np.zeros(5), np.zeros(5)
+        if prior.radius is not None:
+            biased = prior.radius + self.count / self.weight / (2.0 * model[6])  # as a fit to noisy points has it
+            values[4], precisions[4] = biased - model[6], prior.radius_deviation**-2
+        if prior.direction is not None:
+            direction = prior.direction * np.sign(prior.direction @ model[3:6])
+            values[2:4] = self.reach * (self.frame @ direction)
+            precisions[2:4] = (self.reach * prior.direction_deviation) ** -2
+        self.right += precisions * values
+        for matrix in (self.normal, self.slopes, self.scores):
+            matrix[np.diag_indices(5)] += precisions
 
     def one_sidedness(self) -> float:
         """Give chi-square of five degrees of freedom of the outliers about the surface."""

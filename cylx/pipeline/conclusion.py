@@ -19,10 +19,8 @@ from cylx.records import (
     Scene,
     StageReport,
 )
+from cylx.stages.averaging import STRUCTURED
 from cylx.stages.labelling import label_points, surface_points
-
-STRUCTURED = 1.4
-"""A lack of fit (chi-square per cell) beyond this is none by chance."""
 
 
 def conclude(

@@ -8,6 +8,7 @@ accuracy of a fit to the segmented cylinder.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import points_on, visible_extent
-from cylx.geometry.mixture_fit import fit_mixture
+from cylx.geometry.mixture_fit import Prior, fit_mixture
 from cylx.records import Candidates, Cluster, Ground, Segment
 
 FloatArray = NDArray[np.float64]
@@ -32,6 +33,8 @@ MANY = 20000
 """Points that suffice to judge it; the last fit takes all."""
 BEYOND = 1.02
 """A fit goes this much further than the ends: the outermost points lie on them, and rounding would choose."""
+STRUCTURED = 1.4
+"""A lack of fit (chi-square per cell) beyond this is none by chance."""
 SURE = 8.0
 """Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
 LEAST_COSINE = math.cos(math.radians(25.0))
@@ -150,13 +153,20 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     return Segment(model, segment.half, spread)
 
 
-def finish(segment: Segment, ground: Ground) -> Segment | str:
+def finish(segment: Segment, ground: Ground, known: Prior | None = None, *, structured: bool = False) -> Segment | str:
     """Fit a cylinder to all its points by maximum likelihood, and say how uncertain it is.
+
+    What is known draws the fit to it, as far as the points do not contradict it: a prior that is wrong by many
+    standard deviations would spoil the fit.
 
     Parameters
     ----------
     segment : Segment
     ground : Ground
+    known : Prior, optional
+    structured : bool
+        Whether the object is no perfect cylinder, so that its residuals are no noise. The likelihood would be that of
+        its most cylindrical part; the robust fit is drawn by all of it, and stays.
 
     Returns
     -------
@@ -170,11 +180,15 @@ def finish(segment: Segment, ground: Ground) -> Segment | str:
     model, spread = fit
     model[3:6] *= np.sign(model[3 + int(np.abs(model[3:6]).argmax())])  # as the result has it
     end, deviation = BEYOND * segment.half, max(spread, 1e-9 * model[6])  # points may lie on the surface exactly
-    likely = fit_mixture(
-        points, model, low=-end, high=end, width=min(SURE * deviation, 2.0 * width), deviation=deviation
-    )
+    limits = {"low": -end, "high": end, "width": min(SURE * deviation, 2.0 * width), "deviation": deviation}
+    likely = fit_mixture(points, model, **limits)
     if likely is None:
         return refit(segment, ground)
+    if structured and known is None:
+        fitted = refit(segment, ground)
+        return fitted if isinstance(fitted, str) else replace(fitted, covariance=likely.covariance)
+    if known is not None:
+        likely = fit_mixture(points, model, **limits, prior=known.as_far_as_borne_out(likely)) or likely
     return Segment(likely.model, segment.half, spread, likely.covariance)
 
 
