@@ -65,8 +65,11 @@ def trial(cell, seed):
     )
     turn = Rotation.random(rng=np.random.default_rng(seed))
     before = scene.cylinders[0].cylinder
-    true = Cylinder(turn.apply(before.point), turn.apply(before.direction), before.radius, before.height)
-    found = extract_cylinders(PointCloud(turn.apply(scene.points)), Config(max_cylinders=1), threads=1).cylinders
+    point, direction = turn.apply(np.array(before.point)), turn.apply(np.array(before.direction))
+    true = Cylinder(point, direction, before.radius, before.height)
+    found = extract_cylinders(
+        PointCloud(turn.apply(np.array(scene.points))), Config(max_cylinders=1), threads=1
+    ).cylinders
     if not found or found[0].covariance is None:
         return None
     fit, covariance = found[0].cylinder, found[0].covariance
