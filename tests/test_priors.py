@@ -173,3 +173,9 @@ def test_a_known_direction_makes_the_tilt_more_certain(can):
     (one,), (other,) = Result.of(free).cylinders, Result.of(drawn).cylinders
     assert other.uncertainty.axis_angle_deg == pytest.approx(0.001 * np.sqrt(2), rel=0.05)
     assert one.uncertainty.axis_angle_deg > 5 * other.uncertainty.axis_angle_deg
+
+
+def test_a_known_radius_that_nothing_has_is_told_of(can):
+    (warning,) = extract(can.points, known_radius=(2.0, None)).warnings
+    assert warning.startswith("no cylinder has the known radius of 2; the nearest has 1.0")
+    assert extract(can.points, known_radius=(1.0, None)).warnings == ()

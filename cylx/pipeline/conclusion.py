@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import Config
+from cylx.geometry.mixture_fit import CONTRADICTION
 from cylx.measures import covered_angle
 from cylx.records import (
     CylinderFit,
@@ -77,7 +78,7 @@ def conclude(
     in_cloud = np.empty(len(labels), np.int32), np.empty(len(labels), np.float32)
     in_cloud[0][frame.order] = number[labels]
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
-    warnings = tuple(_warnings(scene, fits))
+    warnings = (*_warnings(scene, fits), *_contradicted(config, fits))
     lost = [Refusal.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
     rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified))
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
@@ -117,6 +118,21 @@ def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verifie
         )
         out.append(Rejection(fit, refusal.reason))
     return sorted(out, key=lambda one: (one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers))
+
+
+def _contradicted(config: Config, fits: list[CylinderFit]) -> list[str]:
+    """Name what was said to be known and holds of no cylinder that was found."""
+    radius, spread = config.scene.known_radius, config.scene.known_radius_sd or 0.0
+    certain = [(fit.cylinder.radius, fit.covariance[4, 4]) for fit in fits if fit.covariance is not None]
+    if radius is None or not certain:
+        return []
+    if any((found - radius) ** 2 <= CONTRADICTION**2 * (spread**2 + variance) for found, variance in certain):
+        return []
+    nearest = min((found for found, _ in certain), key=lambda found: abs(found - radius))
+    return [
+        f"no cylinder has the known radius of {radius:.5g}; the nearest has {nearest:.5g}, "
+        "and all are as they are without it"
+    ]
 
 
 def _warnings(scene: Scene, fits: list[CylinderFit]) -> list[str]:
