@@ -68,8 +68,8 @@ class Prior(NamedTuple):
     direction: FloatArray | None = None
     direction_deviation: float = math.inf
 
-    def as_far_as_borne_out(self, fit: MixtureFit) -> Prior:
-        """Leave out what a fit without it contradicts, by `CONTRADICTION` standard deviations."""
+    def as_far_as_borne_out(self, fit: MixtureFit) -> Prior | None:
+        """Leave out what a fit without it contradicts by `CONTRADICTION` standard deviations; None if that is all."""
         covariance, kept = fit.covariance, self
         if self.radius is not None:
             away = fit.model[6] - self.radius
@@ -82,7 +82,7 @@ class Prior(NamedTuple):
             spread = covariance[2:4, 2:4] + self.direction_deviation**2 * np.eye(2)
             if tilts @ np.linalg.solve(spread, tilts) > CONTRADICTION**2:
                 kept = kept._replace(direction=None)
-        return kept
+        return None if kept.radius is None and kept.direction is None else kept
 
 
 def fit_mixture(

@@ -35,6 +35,10 @@ class Law(NamedTuple):
         Of outliers among the points, in [0, 1).
     """
 
+    deviation: float
+    broad: float
+    share: float
+
     def weights(self, width: float, *, outliers: bool) -> FloatArray:
         """Tabulate what a residual weighs, shape (BINS + 1, 3), at equal steps of its absolute value up to `width`.
 
@@ -48,10 +52,6 @@ class Law(NamedTuple):
         weight = (1.0 - outer) / narrow + outer * gain
         slope = weight - outer * (1.0 - outer) * squares * (1.0 / narrow - gain) * (1.0 / narrow - 1.0 / broad)
         return np.column_stack([weight, slope, outer / broad])
-
-    deviation: float
-    broad: float
-    share: float
 
 
 def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:

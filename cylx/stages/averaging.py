@@ -184,11 +184,12 @@ def finish(segment: Segment, ground: Ground, known: Prior | None = None, *, stru
     likely = fit_mixture(points, model, **limits)
     if likely is None:
         return refit(segment, ground)
-    if structured and known is None:
+    prior = None if known is None else known.as_far_as_borne_out(likely)
+    if structured and prior is None:
         fitted = refit(segment, ground)
         return fitted if isinstance(fitted, str) else replace(fitted, covariance=likely.covariance)
-    if known is not None:
-        likely = fit_mixture(points, model, **limits, prior=known.as_far_as_borne_out(likely)) or likely
+    if prior is not None:
+        likely = fit_mixture(points, model, **limits, prior=prior) or likely
     return Segment(likely.model, segment.half, spread, likely.covariance)
 
 
