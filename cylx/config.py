@@ -10,171 +10,36 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from cylx.config_faults import describe_fault
 from cylx.config_layers import Layer, file_layer, merge, nested, override_layer, preset_layer
+from cylx.config_sections import (
+    AveragingConfig,
+    CandidatesConfig,
+    ClusteringConfig,
+    EllipsesConfig,
+    SceneConfig,
+    Section,
+    SlicingConfig,
+    VerificationConfig,
+)
 from cylx.errors import ConfigError
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0)]
-Share = Annotated[Number, Field(ge=0, le=1)]
-Axis = Annotated[list[Number], Field(min_length=3, max_length=3)]
-
-
-class Section(BaseModel):
-    """A part of the configuration: unknown keys, wrong types and impossible values are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
-
-
-class SceneConfig(Section):
-    """What is known of the cloud before looking at it; `null` is read off the cloud."""
-
-    spacing: Positive | None = None
-    """Distance of neighbouring points on a surface, scene units."""
-    noise: Positive | None = None
-    """Standard deviation of points about their surface, scene units."""
-    radius_min: Positive | None = None
-    """Smallest radius looked for, scene units. Raising it drops thin pipes."""
-    radius_max: Positive | None = None
-    """Largest radius looked for, scene units. Lowering it drops tanks and walls that are hardly curved."""
-    axis: Axis | None = None
-    """Direction of the cylinders looked for, in the coordinates of the scan; its length and sign do not matter."""
-    axis_tolerance_deg: Annotated[Number, Field(gt=0, le=90)] = 10.0
-    """Largest angle of a cylinder to `axis`, degrees; means nothing without it."""
-    axis_sd_deg: Annotated[Number, Field(gt=0, le=90)] | None = None
-    """Standard deviation of the cylinders' tilts from `axis`, degrees: each fit is drawn to it; null draws none."""
-    known_radius: Positive | None = None
-    """Radius the cylinders are known to have, scene units: each fit is drawn to it that does not contradict it."""
-    known_radius_sd: Positive | None = None
-    """Standard deviation of `known_radius`, scene units; null is a thousandth of it."""
-
-    @model_validator(mode="after")
-    def _check_axis(self) -> SceneConfig:
-        if self.axis is not None and not any(self.axis):
-            raise ValueError("axis [0, 0, 0] is no direction; write [0, 0, 1] for upright")
-        return self
-
-    @model_validator(mode="after")
-    def _check_radii(self) -> SceneConfig:
-        if self.radius_min is not None and self.radius_max is not None and self.radius_min > self.radius_max:
-            raise ValueError(f"radius_min {self.radius_min:g} is above radius_max {self.radius_max:g}; swap them")
-        return self
-
-
-class SlicingConfig(Section):
-    """Planes through the whole cloud and through windows of every scale, and the points close to them."""
-
-    planes: Annotated[int, Field(ge=0)] = 40
-    """Number of random planes N. More planes find more cylinders and take longer."""
-    local_planes: Annotated[int, Field(ge=0)] = 2
-    """Planes through each window, besides one across its longest direction; 0 leaves the windows out."""
-    windows: Annotated[int, Field(ge=1)] = 300
-    """Most windows of one scale, where nothing else explains the points. More windows find more thin, sparse pipes."""
-    thickness: Positive | None = None
-    """Full thickness of a slice through the whole cloud, scene units. Thicker slices smear the ellipse."""
-    min_points: Annotated[int, Field(ge=6)] = 20
-    """A slice, or a piece of one, with fewer points is dropped."""
-
-
-class EllipsesConfig(Section):
-    """Ellipses in each slice, by RANSAC and the direct least-squares fit."""
-
-    pieces: bool = True
-    """Look in each connected piece of a slice by itself; false looks in the slice as a whole, as the paper does."""
-    iterations: Annotated[int, Field(ge=1)] = 200
-    """RANSAC samples an ellipse. More samples stand more outliers and take longer."""
-    tolerance: Positive | None = None
-    """Distance within which a point supports an ellipse, scene units."""
-    min_inliers: Annotated[int, Field(ge=6)] = 20
-    """An ellipse with fewer supporting points is dropped."""
-    min_share: Share = 0.3
-    """An ellipse with a smaller share of its piece's remaining points is dropped."""
-    max_per_slice: Annotated[int, Field(ge=1)] = 50
-    """Most ellipses taken from one slice."""
-    max_aspect: Annotated[Number, Field(gt=1)] = 4.0
-    """Largest ratio of the semi-axes; slices more oblique than this say little about the axis."""
-
-
-class CandidatesConfig(Section):
-    """Cylinder candidates, from the ellipses of slices and from local curvature."""
-
-    sources: Annotated[list[Literal["slices", "curvature"]], Field(min_length=1)] = ["slices", "curvature"]
-    """Where candidates come from; the paper has slices alone."""
-    polish: bool = True
-    """Fit each candidate to the points about it before the game."""
-    octave: Annotated[Number, Field(gt=1.1, le=4)] = 1.6
-    """Ratio of successive window radii. A smaller ratio looks at more scales and takes longer."""
-    window_spacings: Positive = 2.2
-    """Radius of the smallest curvature window, in spacings."""
-    window_noises: Positive = 5.0
-    """Least radius of the smallest curvature window, in noises."""
-    min_inliers: Annotated[int, Field(ge=6)] = 15
-    """A polished candidate with fewer supporting points is dropped."""
-    min_share: Share = 0.25
-    """A polished candidate that explains a smaller share of its window is dropped."""
-
-
-class ClusteringConfig(Section):
-    """The game that candidates play for their clusters."""
-
-    kernel: Literal["screw", "local"] = "local"
-    """`screw`: eq. 1 and 2 of the paper; `local`: angle, offset at the candidates in radii, and ratio of radii."""
-    screw_scale: Positive = 5.0
-    """Lambda of eq. 2, used by the `screw` kernel; lengths in the median candidate radius. Larger is more tolerant."""
-    angle_deg: Annotated[Number, Field(gt=0, lt=90)] = 4.0
-    """Axis angle at which the `local` kernel has fallen to 1/e, degrees."""
-    offset: Positive = 0.1
-    """Axis offset at which the `local` kernel has fallen to 1/e, in radii."""
-    radius: Positive = 0.06
-    """Relative difference of radii at which the `local` kernel has fallen to 1/e."""
-    min_radius_ratio: Share = 0.75
-    """p of eq. 2: candidates whose radii differ more are incompatible."""
-    diagonal: Annotated[Number, Field(ge=0, le=1)] = 0.0
-    """Payoff of a candidate against itself; 1 in eq. 5, but then every stable state is one single candidate."""
-    dynamics: Literal["replicator", "infection-immunization"] = "infection-immunization"
-    """How the population evolves: eq. 7, or a faster way to the same equilibria."""
-    population: Literal["whole", "local"] = "local"
-    """Who plays: all candidates that are left, or the best connected one and its neighbours."""
-    max_iterations: Annotated[int, Field(ge=1)] = 300
-    """Most steps of the dynamics a cluster."""
-    tolerance: Positive = 1e-4
-    """The dynamics stop when a step changes the shares by less than this, or when nobody could gain more than this."""
-    min_support: Annotated[int, Field(ge=1)] = 3
-    """A cluster with fewer candidates is dropped."""
-    min_payoff: Share = 0.3
-    """A cluster with a smaller mean payoff is dropped."""
-
-
-class AveragingConfig(Section):
-    """From the candidates of a cluster to one cylinder."""
-
-    max_iterations: Annotated[int, Field(ge=1)] = 20
-    """Most steps of the dual-quaternion blending; where `refine` is on, its fit takes the place of it."""
-    refine: bool = True
-    """Fit the average to all its points in the cloud, and let it grow along its axis."""
-    merge: bool = True
-    """Join pieces of one pipe where one cylinder explains both."""
-
-
-class VerificationConfig(Section):
-    """What a cylinder must show to be accepted: its confidence, and limits that hold whatever the confidence."""
-
-    enabled: bool = True
-    """Verify at all; the paper does not."""
-    min_confidence: Share = 0.5
-    """Least confidence. Raising it gives fewer false cylinders and more missed ones."""
-    min_inliers: Annotated[int, Field(ge=0)] = 40
-    """Fewest points of a cylinder."""
-    min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 20.0
-    """Smallest angle about the axis that must be covered, degrees. This one holds even if `enabled` is false."""
-    min_height: Annotated[Number, Field(ge=0)] = 0.4
-    """Smallest visible length, in radii."""
-    max_slope: Annotated[Number, Field(ge=0)] = 0.03
-    """Largest change of the radius along the axis, beyond three standard errors: tells a cylinder from a cone."""
-    max_bulge: Annotated[Number, Field(ge=0)] = 0.15
-    """Largest curvature along the axis times the radius, beyond three standard errors; a sphere has 1."""
+__all__ = [
+    "AveragingConfig",
+    "CandidatesConfig",
+    "ClusteringConfig",
+    "Config",
+    "EllipsesConfig",
+    "SceneConfig",
+    "Section",
+    "SlicingConfig",
+    "VerificationConfig",
+    "check_tolerance",
+    "load_config",
+    "preset_names",
+]
 
 
 class Config(Section):
