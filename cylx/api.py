@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 def extract(
     points_or_path: ArrayLike | PointCloud | str | PathLike[str],
     *,
+    method: str | None = None,
     preset: str | None = None,
     config: Config | str | PathLike[str] | None = None,
     overrides: Sequence[str] = (),
@@ -41,6 +42,8 @@ def extract(
     ----------
     points_or_path : array_like of shape (N, 3), PointCloud, str or Path
         Coordinates in any unit, or a file that holds them.
+    method : str, optional
+        `gt`, the clustering game, or one of its competitors, `msac`, `line-fit`, `tran` and `jin`.
     preset : str, optional
         `auto` or `paper`; by default the one of the configuration, or `auto`.
     config : Config, str or Path, optional
@@ -93,6 +96,7 @@ def extract(
     [1.0]
     """
     options = named_options(
+        method=method,
         seed=seed,
         radius=radius,
         max_cylinders=max_cylinders,

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationError, model_validator
 
+from cylx.config_baselines import JinConfig, LineFitConfig, MsacConfig, TranConfig
 from cylx.config_faults import describe_fault
 from cylx.config_layers import Layer, file_layer, merge, nested, override_layer, preset_layer
 from cylx.config_sections import (
@@ -32,9 +33,13 @@ __all__ = [
     "ClusteringConfig",
     "Config",
     "EllipsesConfig",
+    "JinConfig",
+    "LineFitConfig",
+    "MsacConfig",
     "SceneConfig",
     "Section",
     "SlicingConfig",
+    "TranConfig",
     "VerificationConfig",
     "check_tolerance",
     "load_config",
@@ -47,6 +52,8 @@ class Config(Section):
 
     preset: Literal["auto", "paper"] = "auto"
     """Where the values start from: `auto`, the best we can do, or `paper`, the paper to the letter."""
+    method: Literal["gt", "msac", "line-fit", "tran", "jin"] = "gt"
+    """How cylinders are found: `gt`, the clustering game; the others are what the paper compares it with."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of everything random; the same seed gives the same bytes, on any number of threads."""
     max_cylinders: Annotated[int, Field(ge=1)] | None = None
@@ -65,6 +72,14 @@ class Config(Section):
     """Stage 5: one cylinder a cluster."""
     verification: VerificationConfig = VerificationConfig()
     """What a cylinder must show to be accepted."""
+    msac: MsacConfig = MsacConfig()
+    """Sample consensus, used by `method: msac`."""
+    line_fit: LineFitConfig = LineFitConfig()
+    """A line through the centres of ellipses, used by `method: line-fit`."""
+    tran: TranConfig = TranConfig()
+    """Growing from seeds, used by `method: tran`."""
+    jin: JinConfig = JinConfig()
+    """Spheres that roll within a pipe, used by `method: jin`."""
 
     @model_validator(mode="after")
     def _check_sources(self) -> Config:
@@ -119,6 +134,9 @@ def load_config(
         merged = merge(merged, layer.values)
     config = _validate(merged, given)
     _check_known(config.scene)
+    if config.slicing.inclination_deg is not None and config.scene.axis is None:
+        raise ConfigError("slicing.inclination_deg", "is given without the axis it refers to", "give scene.axis, too")
+    _check_method(config)
     return config
 
 
@@ -131,6 +149,16 @@ def _check_known(scene: SceneConfig) -> None:
     for name, (deviation, value, needed) in pairs.items():
         if deviation is not None and value is None:
             raise ConfigError(f"scene.{name}", f"is given without scene.{needed}", "give that, too")
+
+
+def _check_method(config: Config) -> None:
+    """Refuse what the other methods cannot do: they have no covariance for what is known to be weighed by."""
+    if config.method == "gt":
+        return
+    for name in ("known_radius", "axis_sd_deg"):
+        if getattr(config.scene, name) is not None:
+            fault = f"is for method gt alone, and the method is {config.method}"
+            raise ConfigError(f"scene.{name}", fault, "leave it out, or give scene.radius_min and scene.radius_max")
 
 
 def check_tolerance(config: Config, options: Mapping[str, object]) -> None:

@@ -72,6 +72,7 @@ def override_layer(text: str) -> Layer:
 
 def named_options(
     *,
+    method: str | None = None,
     seed: int | None = None,
     radius: tuple[float | None, float | None] | None = None,
     max_cylinders: int | None = None,
@@ -86,6 +87,8 @@ def named_options(
 
     Parameters
     ----------
+    method : str, optional
+        As in the configuration.
     seed, max_cylinders, planes : int, optional
         As in the configuration.
     radius : pair of float or None, optional
@@ -109,6 +112,7 @@ def named_options(
     smallest, largest = radius or (None, None)
     known, known_sd = known_radius or (None, None)
     values = {
+        "method": method,
         "seed": seed,
         "max_cylinders": max_cylinders,
         "slicing.planes": planes,

@@ -12,6 +12,9 @@ Share = Annotated[Number, Field(ge=0, le=1)]
 Axis = Annotated[list[Number], Field(min_length=3, max_length=3)]
 
 
+Inclination = Annotated[Number, Field(ge=0, le=90)]
+
+
 class Section(BaseModel):
     """A part of the configuration: unknown keys, wrong types and impossible values are errors."""
 
@@ -58,6 +61,8 @@ class SlicingConfig(Section):
 
     planes: Annotated[int, Field(ge=0)] = 40
     """Number of random planes N. More planes find more cylinders and take longer."""
+    inclination_deg: Annotated[list[Inclination], Field(min_length=2, max_length=2)] | None = None
+    """Least and greatest angle of the normals of these planes to `scene.axis`, degrees; null draws any."""
     local_planes: Annotated[int, Field(ge=0)] = 2
     """Planes through each window, besides one across its longest direction; 0 leaves the windows out."""
     windows: Annotated[int, Field(ge=1)] = 300
@@ -66,6 +71,13 @@ class SlicingConfig(Section):
     """Full thickness of a slice through the whole cloud, scene units. Thicker slices smear the ellipse."""
     min_points: Annotated[int, Field(ge=6)] = 20
     """A slice, or a piece of one, with fewer points is dropped."""
+
+    @model_validator(mode="after")
+    def _check_inclination(self) -> SlicingConfig:
+        if self.inclination_deg is not None and self.inclination_deg[0] > self.inclination_deg[1]:
+            low, high = self.inclination_deg
+            raise ValueError(f"inclination_deg [{low:g}, {high:g}] has its least angle above its greatest; swap them")
+        return self
 
 
 class EllipsesConfig(Section):

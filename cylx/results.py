@@ -148,9 +148,9 @@ class Measured(Part):
     coverage_deg: Annotated[Number, Field(ge=0, le=360)]
     """Angle about the axis that the inliers cover, degrees."""
     support: Count
-    """Candidates in its cluster."""
-    payoff: Number
-    """Mean payoff of its cluster, 0 to 1."""
+    """Candidates in its cluster; of the other methods, hypotheses that led to it."""
+    payoff: Number | None = None
+    """Mean payoff of its cluster, 0 to 1; absent where no game was played."""
     confidence: Annotated[Number, Field(ge=0, le=1)] | None = None
     """Probability that this is a cylinder of the scene; absent where it was not computed."""
     uncertainty: Uncertainty | None = None
@@ -174,7 +174,7 @@ class Measured(Part):
             "rmse": float(fit.rmse),
             "coverage_deg": min(degrees(fit.coverage), 360.0),
             "support": int(fit.support),
-            "payoff": float(fit.payoff),
+            "payoff": None if fit.payoff is None else float(fit.payoff),
             "confidence": fit.confidence,
             "uncertainty": None if fit.covariance is None else Uncertainty.keys_of(fit.covariance),
             "evidence": evidence or None,
@@ -201,7 +201,7 @@ class Result(Part):
     """Version of cylx that wrote it."""
     input: Input
     """What was looked at."""
-    method: Literal["gt"] = "gt"
+    method: Literal["gt", "msac", "line-fit", "tran", "jin"] = "gt"
     """How the cylinders were found; `gt` is the clustering game."""
     config: dict[str, JsonValue]
     """The resolved configuration, every value."""
@@ -226,6 +226,7 @@ class Result(Part):
         return cls(
             cylx_version=__version__,
             input=Input.of(extraction),
+            method=extraction.config.method,
             config=extraction.config.model_dump(mode="json"),
             scene=SceneScale(spacing=float(extraction.scene.spacing), noise=float(extraction.scene.noise)),
             stages=[_stage(report) for report in extraction.stages],

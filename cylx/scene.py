@@ -263,6 +263,9 @@ def resolve(config: Config, scene: Scene) -> Config:
         },
         "slicing": {"thickness": thickness},
         "ellipses": {"tolerance": config.ellipses.tolerance or 4.0 * scene.noise + 0.06 * thickness},
+        "msac": {"distance": config.msac.distance or 3.0 * scene.noise},
+        "tran": {"distance": config.tran.distance or 3.0 * scene.noise},
+        "jin": {"distance": config.jin.distance or 3.0 * scene.noise},
     }
     return config.model_copy(
         update={name: getattr(config, name).model_copy(update=values) for name, values in known.items()}

@@ -2,7 +2,7 @@
 
 | function | options | the command gets |
 |---|---|---|
-| `configured` | `-c/--config --preset --set --seed` and what is known: `--radius --axis` … | `settings`, a `Config` |
+| `configured` | `-c/--config --method --preset --set --seed`, and limits: `--radius` … | `settings`, a `Config` |
 | `talking` | `-q/--quiet -v/--verbose` | `talk`, a `Conversation` |
 | `overwrite_option` | `--overwrite` | `overwrite`, a bool |
 | `json_option` | `--json` | `as_json`, a bool |
@@ -27,6 +27,7 @@ Bounds = tuple[float | None, float | None]
 Known = tuple[float, float | None]
 
 PRESETS = ("auto", "paper")
+METHODS = ("gt", "msac", "line-fit", "tran", "jin")
 
 
 if TYPE_CHECKING:
@@ -135,6 +136,7 @@ def configured(command: Command) -> Command:
     def with_settings(
         *args: object,
         config: str | None,
+        method: str | None,
         preset: str | None,
         overrides: tuple[str, ...],
         seed: int | None,
@@ -152,6 +154,7 @@ def configured(command: Command) -> Command:
         from cylx.config_layers import named_options
 
         options = named_options(
+            method=method,
             seed=seed,
             radius=radius,
             max_cylinders=max_cylinders,
@@ -178,6 +181,12 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
         metavar="FILE",
         shell_complete=complete_files,
         help="YAML file; 'cylx config init' writes one.",
+    ),
+    click.option(
+        "--method",
+        type=click.Choice(METHODS),
+        help="How cylinders are found: by the clustering game, or by a method that the paper compares it with."
+        "  [default: gt]",
     ),
     click.option(
         "--preset",

@@ -62,3 +62,64 @@ def search_circle(
             record = score
             shape[0], shape[1], shape[2], shape[3], shape[4] = ax + x, ay + y, radius, radius, 0.0
     return record
+
+
+def fit_circle(points: FloatArray, steps: int = 5) -> tuple[FloatArray, float] | None:
+    """Fit a circle to points of the plane by least squares of the orthogonal distances, from Taubin's algebraic fit.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 2)
+    steps : int
+        Gauss-Newton steps.
+
+    Returns
+    -------
+    center : ndarray of shape (2,)
+    radius : float
+
+    None if the points lie on a line, or are fewer than three.
+    """
+    if len(points) < 3:
+        return None
+    middle = points.mean(axis=0)
+    center, radius = _taubin(points - middle)
+    if not (math.isfinite(radius) and radius > 0.0):
+        return None
+    for _ in range(steps):
+        offsets = points - middle - center
+        distances = np.hypot(offsets[:, 0], offsets[:, 1])
+        if not distances.all():
+            return None
+        rows = np.column_stack([offsets / distances[:, None], np.ones(len(points))])
+        step, _, rank, _ = np.linalg.lstsq(rows, distances - radius, rcond=None)
+        if rank < 3:
+            return None
+        center, radius = center + step[:2], radius + float(step[2])
+        if not 0.0 < radius < math.inf:
+            return None
+    return middle + center, radius
+
+
+def _taubin(points: FloatArray) -> tuple[FloatArray, float]:
+    """Give Taubin's circle of centred points by Newton's method on its characteristic polynomial (Chernov, 2010)."""
+    x, y = points[:, 0], points[:, 1]
+    z = x * x + y * y
+    xx, yy, xy = float((x * x).mean()), float((y * y).mean()), float((x * y).mean())
+    xz, yz, zz = float((x * z).mean()), float((y * z).mean()), float((z * z).mean())
+    mean, area, spread = xx + yy, xx * yy - xy * xy, zz - (xx + yy) ** 2
+    a3, a2 = 4.0 * mean, -3.0 * mean * mean - zz
+    a1 = spread * mean + 4.0 * area * mean - xz * xz - yz * yz
+    a0 = xz * (xz * yy - yz * xy) + yz * (yz * xx - xz * xy) - spread * area
+    root, value = 0.0, math.inf
+    for _ in range(20):
+        here = a0 + root * (a1 + root * (a2 + root * a3))
+        slope = a1 + root * (2.0 * a2 + root * 3.0 * a3)
+        if abs(here) >= abs(value) or slope == 0.0:
+            break
+        value, root = here, root - here / slope
+    det = 2.0 * (root * root - root * mean + area)
+    if det == 0.0:
+        return np.zeros(2), math.inf
+    center = np.array([xz * (yy - root) - yz * xy, yz * (xx - root) - xz * xy]) / det
+    return center, math.sqrt(float(center @ center) + mean)

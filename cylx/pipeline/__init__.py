@@ -6,6 +6,7 @@ import os
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
+from cylx.pipeline.competitors import extract_by_competitor
 from cylx.pipeline.conclusion import conclude
 from cylx.pipeline.journal import Journal
 from cylx.pipeline.sources import (
@@ -47,6 +48,8 @@ def extract_cylinders(
     ------
     InputError
         If no cylinder could be told from anything else in the cloud (see `cylx.scene.check_usable`).
+    ConfigError
+        If the method needs open3d, and it cannot be imported.
     """
     check_usable(cloud.points, cloud.source.file)
     threads = threads or os.cpu_count() or 1
@@ -54,6 +57,8 @@ def extract_cylinders(
     if kernels_are_cold():
         with journal.stage("compiling"), second_process():
             extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
+    if config.method != "gt":
+        return extract_by_competitor(cloud, config, threads, journal)
     with journal.stage("scene"):
         frame, scene = make_frame(cloud.points, config)
         config = resolve(config, scene)

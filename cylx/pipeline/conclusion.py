@@ -55,7 +55,8 @@ def conclude(
     """
     labels, residuals = label_points([finding.segment for finding in findings], ground)
     counts = np.bincount(labels[labels >= 0], minlength=len(findings))
-    verified = config.verification.enabled
+    game = config.method == "gt"
+    verified = config.verification.enabled and game
     trust = np.array([finding.confidence if verified else 0.0 for finding in findings])
     order = [int(i) for i in np.lexsort((np.arange(len(findings)), -counts, -trust)) if counts[i] > 0]
     squares = np.bincount(labels[labels >= 0], residuals[labels >= 0] ** 2, minlength=len(findings))
@@ -66,7 +67,7 @@ def conclude(
             float(np.sqrt(squares[i] / counts[i])) * frame.spacing,
             findings[i].coverage,
             findings[i].support,
-            findings[i].payoff,
+            findings[i].payoff if game else None,
             findings[i].confidence if verified else None,
             findings[i].measures,
             _covariance(findings[i], frame.spacing),
@@ -80,7 +81,7 @@ def conclude(
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
     warnings = (*_warnings(scene, fits), *_contradicted(config, fits))
     lost = [Refusal.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
-    rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified))
+    rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified, game=game))
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
 
 
@@ -98,7 +99,7 @@ def _covariance(finding: Finding, spacing: float) -> NDArray[np.float64] | None:
     return np.asarray(covariance * np.outer(units, units) * (lack if lack > STRUCTURED else 1.0))
 
 
-def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verified: bool) -> list[Rejection]:
+def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verified: bool, game: bool) -> list[Rejection]:
     """Put what was refused into scene units, the most trusted first; what has no shape at all is left out."""
     out = []
     for refusal in refused:
@@ -112,7 +113,7 @@ def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verifie
             float(np.sqrt((residuals**2).sum() / max(len(residuals), 1))) * frame.spacing,
             refusal.coverage if refusal.measures else covered_angle(angles),
             refusal.support,
-            refusal.payoff,
+            refusal.payoff if game else None,
             refusal.confidence if verified else None,
             refusal.measures,
         )

@@ -47,8 +47,9 @@ def ellipses_of_slices(
     """Cut the cloud by random planes and fit all ellipses; each slice has a generator of its own."""
     if "slices" not in config.candidates.sources:
         return []
-    planes = draw_planes(frame, config.slicing, config.seed)
+    planes = draw_planes(frame, config.slicing, config.seed, config.scene.axis)
     thickness = (config.slicing.thickness or 0.0) / frame.spacing
+    polished = config.method == "gt" and config.candidates.polish
     tolerance = (config.ellipses.tolerance or 0.0) / frame.spacing
     # points of large flat windows are explained already; the paper's preset has none
     eligible = frame.points[flatness < LARGE * frame.window] if flatness.any() else frame.points
@@ -65,7 +66,7 @@ def ellipses_of_slices(
             tolerance=tolerance,
             radius_range=radii,
             rng=np.random.default_rng([config.seed, 3, index]),
-            refits=0 if config.candidates.polish else 3,  # the polish sees the points in space
+            refits=0 if polished else 3,  # the polish sees the points in space
         )
 
     with ThreadPoolExecutor(threads) as pool:

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.consensus import Neighbourhood, is_contradicted
-from cylx.geometry.lines import are_along
 from cylx.geometry.mixture_fit import Prior
 from cylx.pipeline.journal import Journal
+from cylx.pipeline.limits import out_of_range
 from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import STRUCTURED, average_cluster, finish, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
@@ -214,10 +214,4 @@ class Turns:
         )
 
     def _out_of_range(self, segment: Segment) -> str:
-        """Name the prior that a segment does not keep, or nothing."""
-        if not self._radii[0] <= segment.model[6] <= self._radii[1]:
-            return "radius out of range"
-        scene = self._config.scene
-        tolerance = math.radians(scene.axis_tolerance_deg)
-        astray = scene.axis is not None and not are_along(segment.model[3:6], scene.axis, tolerance)
-        return "axis out of range" if astray else ""
+        return out_of_range(segment, self._radii, self._config.scene)

@@ -60,7 +60,7 @@ class Finding:
     support : int
         Candidates of its cluster.
     payoff : float
-        Mean payoff of its cluster.
+        Mean payoff of its cluster; 0 if no game was played.
     confidence : float
         Probability that it is a cylinder.
     coverage : float
@@ -95,7 +95,7 @@ class Refusal:
     support : int
         Candidates of its cluster.
     payoff : float
-        Mean payoff of its cluster.
+        Mean payoff of its cluster; 0 if no game was played.
     confidence : float or None
         Probability that it is a cylinder; None if it was refused before anything was measured.
     coverage : float
@@ -135,8 +135,8 @@ class CylinderFit:
         Angle about the axis that the inliers cover, radians, in (0, 2 pi].
     support : int
         Candidates in its cluster.
-    payoff : float
-        Mean payoff of the cluster, in [0, 1].
+    payoff : float or None
+        Mean payoff of the cluster, in [0, 1]; None if no game was played.
     confidence : float or None
         Probability that it is a cylinder; None if it was not verified.
     evidence : mapping of str to float
@@ -151,7 +151,7 @@ class CylinderFit:
     rmse: float
     coverage: float
     support: int
-    payoff: float
+    payoff: float | None
     confidence: float | None = None
     evidence: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = None

@@ -7,13 +7,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import SlicingConfig
+from cylx.geometry.cylinder import canonical_direction
 from cylx.geometry.plane import Plane, random_directions
 from cylx.records import Frame, Slice
 
 FloatArray = NDArray[np.float64]
 
 
-def draw_planes(frame: Frame, config: SlicingConfig, seed: int) -> list[Plane]:
+def draw_planes(frame: Frame, config: SlicingConfig, seed: int, axis: list[float] | None = None) -> list[Plane]:
     """Draw N planes: normals evenly from the sphere, each through a point of the cloud.
 
     The paper says no more than "random center and normal"; a centre drawn from the points cuts where there is something
@@ -24,6 +25,8 @@ def draw_planes(frame: Frame, config: SlicingConfig, seed: int) -> list[Plane]:
     frame : Frame
     config : SlicingConfig
     seed : int
+    axis : list of float, optional
+        What `inclination_deg` refers to; not looked at without it.
 
     Returns
     -------
@@ -31,8 +34,19 @@ def draw_planes(frame: Frame, config: SlicingConfig, seed: int) -> list[Plane]:
     """
     rng = np.random.default_rng([seed, 2])
     normals = random_directions(config.planes, rng)
+    if config.inclination_deg is not None and axis is not None:
+        normals = _inclined(normals, canonical_direction(axis), config.inclination_deg, rng)
     centers = frame.points[rng.integers(len(frame.points), size=config.planes)]
     return [Plane(center, normal) for center, normal in zip(centers, normals, strict=True)]
+
+
+def _inclined(normals: FloatArray, axis: FloatArray, limits: list[float], rng: np.random.Generator) -> FloatArray:
+    """Bring normals (n, 3) to angles from an axis between two limits, evenly over that part of the sphere."""
+    low, high = np.cos(np.radians(limits))
+    cosines = rng.uniform(high, low, len(normals))
+    across = normals - (normals @ axis)[:, None] * axis
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return np.asarray(cosines[:, None] * axis + np.sqrt(1.0 - cosines**2)[:, None] * across)
 
 
 def cut_slice(points: FloatArray, plane: Plane, thickness: float) -> Slice:

@@ -93,3 +93,29 @@ def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | 
     for place in range(3, width):
         columns[place] = cloud.point[names[place]].numpy()[:, 0]
     return columns.reshape(-1)
+
+
+def estimate_normals(points: NDArray[np.float64], neighbours: int) -> NDArray[np.float64]:
+    """Give the normal of the plane through the nearest neighbours of each point.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+    neighbours : int
+        Nearest points, itself included.
+
+    Returns
+    -------
+    ndarray of shape (N, 3)
+        Unit vectors, either way.
+
+    Raises
+    ------
+    ImportError
+        If open3d is not installed, or does not run here.
+    """
+    open3d = import_open3d()
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(np.ascontiguousarray(points)))
+    nearest = open3d.geometry.KDTreeSearchParamKNN(knn=neighbours)
+    cloud.estimate_normals(nearest, fast_normal_computation=False)
+    return np.array(cloud.normals)

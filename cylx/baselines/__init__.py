@@ -1,0 +1,13 @@
+"""The paper's four competitors (section 4.2), behind the same interface as its own method.
+
+None of them was published with its program; each module says where its method comes from and how we read it. They use
+the same cloud, priors on radius and direction, extents, labels and outputs; they verify nothing and have no confidence.
+"""
+
+from cylx.baselines.jin import find_by_spheres
+from cylx.baselines.line_fit import fit_line_of_centres
+from cylx.baselines.msac import find_by_consensus
+from cylx.baselines.proposal import Proposal
+from cylx.baselines.tran import find_by_growing
+
+__all__ = ["Proposal", "find_by_consensus", "find_by_growing", "find_by_spheres", "fit_line_of_centres"]

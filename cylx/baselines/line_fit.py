@@ -1,0 +1,63 @@
+"""Line fit: a line through the centres of the ellipses of all slices, and the mean of their semi-minor axes.
+
+After the method the paper takes from its reference 26 and describes in sections 3.2 and 4.2: the slices and ellipses
+are the same as those of the game, and all count alike; the cylinder is then refined by a non-linear optimisation.
+
+Our readings: of the ellipses of one slice, which are different cylinders, the best supported one counts; what is
+optimised, which is not said, is the sum of squared orthogonal distances of the points near the surface, over the five
+parameters. It is a method for one cylinder: of several it gives one that is none of them.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.baselines.proposal import Proposal
+from cylx.config import LineFitConfig
+from cylx.geometry.cylinder import canonical_direction, cylinder_coordinates
+from cylx.geometry.cylinder_fit import Kernel, fit_cylinder
+from cylx.records import EllipseFit, Frame
+
+FloatArray = NDArray[np.float64]
+
+WIDE = 1e6
+"""A weight function so many radii wide is none."""
+
+
+def fit_line_of_centres(fits: list[list[EllipseFit]], frame: Frame, config: LineFitConfig) -> list[Proposal]:
+    """Find one cylinder from the ellipses of all slices.
+
+    Parameters
+    ----------
+    fits : list of list of EllipseFit
+        Ellipses of each slice.
+    frame : Frame
+    config : LineFitConfig
+
+    Returns
+    -------
+    list of Proposal
+        One; none if there are fewer than two ellipses.
+    """
+    ellipses = [max(ones, key=lambda fit: fit.inliers) for ones in fits if ones]
+    if len(ellipses) < 2:
+        return []
+    centers = np.array([fit.plane.lift(fit.ellipse.center) for fit in ellipses])
+    radius = float(np.mean([fit.ellipse.semi_minor for fit in ellipses]))
+    point = centers.mean(axis=0)
+    direction = canonical_direction(np.linalg.svd(centers - point)[2][0])
+    found = Proposal.spanning(point, direction, radius, centers, len(ellipses))
+    if not config.refine:
+        return [found]
+    model = found.segment.model
+    _, distances, _ = cylinder_coordinates(frame.points, model[:3], model[3:6])
+    near = frame.points[np.abs(distances - radius) < config.reach * radius]
+    wide = WIDE * radius
+    fit = fit_cylinder(near, model, low=-math.inf, high=math.inf, kernel=Kernel(wide, wide, 1.0, math.inf), steps=50)
+    if fit is None:
+        return [found]
+    model = fit[0]
+    return [Proposal.spanning(model[:3], model[3:6], float(model[6]), near, len(ellipses))]

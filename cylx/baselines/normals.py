@@ -1,0 +1,39 @@
+"""Normals of a cloud, for the methods that need them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.errors import ConfigError
+from cylx.open3d_door import estimate_normals
+
+FloatArray = NDArray[np.float64]
+
+
+def normals_for(method: str, points: FloatArray, neighbours: int) -> FloatArray:
+    """Fit a plane to the neighbours of each point and give its normal, either way.
+
+    Parameters
+    ----------
+    method : str
+        Who needs them.
+    points : ndarray of shape (N, 3)
+    neighbours : int
+        Nearest points of each, itself included, that its plane is fitted to.
+
+    Returns
+    -------
+    ndarray of shape (N, 3)
+        Unit vectors.
+
+    Raises
+    ------
+    ConfigError
+        If open3d, which estimates them, is not there.
+    """
+    try:
+        return estimate_normals(points, neighbours)
+    except ImportError as error:
+        fault = f"needs normals, and open3d, which estimates them, cannot be imported: {error}"
+        raise ConfigError(f"method {method}", fault, "install open3d, or use method gt") from None

@@ -1,0 +1,37 @@
+"""What a competitor finds: a cylinder, and how many of its own hypotheses speak for it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.records import Segment
+
+FloatArray = NDArray[np.float64]
+
+
+class Proposal(NamedTuple):
+    """A cylinder as a competitor left it, in the frame of the cloud.
+
+    Parameters
+    ----------
+    segment : Segment
+        Its height is that of what it was found on.
+    support : int
+        Hypotheses that led to it: ellipses, seeds, spheres; 1 of sample consensus, where one wins.
+    """
+
+    segment: Segment
+    support: int
+
+    @classmethod
+    def spanning(
+        cls, point: FloatArray, direction: FloatArray, radius: float, on: FloatArray, support: int
+    ) -> Proposal:
+        """Make a cylinder as long as the points (n, 3) it was found on."""
+        heights = (on - point) @ direction
+        low, high = float(heights.min()), float(heights.max())
+        middle = point + 0.5 * (low + high) * direction
+        return cls(Segment(np.concatenate([middle, direction, [radius]]), 0.5 * (high - low), 0.0), support)

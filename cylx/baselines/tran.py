@@ -1,0 +1,256 @@
+"""Tran, Cao and Laurendeau: cylinders grown from seeds by their normals, and mean shift over all of them.
+
+After T.-T. Tran, V.-T. Cao and D. Laurendeau, "Extraction of cylinders and estimation of their parameters from point
+clouds", Computers & Graphics 46 (2015), by what the paper says of it: points on curved surface are selected; from the
+neighbourhood of each, the axis comes from the normals, radius and position from a circle fitted to the points projected
+along it; this is repeated, with more inliers each time; what is valid is clustered by mean shift. The paper sets
+alpha = 50, beta = 0.95, ten iterations, and 50 neighbours for the normals (in its tests of outliers 100, and 200 to
+start from).
+
+Our readings: alpha is the fewest points of a valid cylinder (`min_support`; `min_coverage_deg` takes it for an angle),
+and beta the share of the points near its surface whose normals agree with it. Curved are seeds about which the normals
+spread along one direction rather than two. The neighbourhood grows by half its radius an iteration. Mean shift measures
+angle, offset and radius of two cylinders where the first one is, each over a bandwidth of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from cylx.baselines.normals import normals_for
+from cylx.baselines.proposal import Proposal
+from cylx.config import TranConfig
+from cylx.geometry.cells import Cells
+from cylx.geometry.circle import fit_circle
+from cylx.geometry.cylinder import axis_frame, canonical_direction, cylinder_coordinates
+from cylx.geometry.lines import are_along
+from cylx.measures import covered_angle
+from cylx.records import Frame
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.int64]
+
+DRAWN = 4
+"""Points drawn for each seed that is wanted; those on flat surface are no seeds."""
+GROWTH = 1.5
+"""Factor of the neighbourhood's radius an iteration."""
+MOST = 4000
+"""Points of a neighbourhood that suffice for a fit."""
+SHIFTS = 50
+STILL = 1e-4
+"""Bandwidths; a shift shorter than this is the last one."""
+
+
+class Grown(NamedTuple):
+    """A valid cylinder grown from a seed.
+
+    Parameters
+    ----------
+    model : ndarray of shape (7,)
+    ends : ndarray of shape (2, 3)
+        Its lowest and highest inlier.
+    """
+
+    model: FloatArray
+    ends: FloatArray
+
+
+def find_by_growing(
+    frame: Frame,
+    radii: tuple[float, float],
+    axis: tuple[FloatArray, float] | None,
+    config: TranConfig,
+    *,
+    most: int | None,
+    seed: int,
+    threads: int,
+) -> list[Proposal]:
+    """Find cylinders as modes of many that were grown from seeds, the one that most of them led to first.
+
+    Parameters
+    ----------
+    frame : Frame
+    radii : tuple of float
+        Least and greatest radius, frame units.
+    axis : tuple of ndarray of shape (3,) and float, or None
+        Unit direction of the axes looked for, and the greatest angle to it, radians.
+    config : TranConfig
+        Resolved.
+    most : int or None
+        Most cylinders.
+    seed : int
+    threads : int
+        Does not change the result.
+
+    Returns
+    -------
+    list of Proposal
+
+    Raises
+    ------
+    ConfigError
+        If open3d cannot be imported.
+    """
+    rng = np.random.default_rng([seed, 15])
+    garden = _Garden(frame, normals_for("tran", frame.points, config.neighbours), radii, config)
+    drawn = rng.permutation(len(frame.points))[: DRAWN * config.seeds]
+    starts = garden.curved_starts(drawn)[: config.seeds]
+    with ThreadPoolExecutor(threads) as pool:
+        grown = [one for one in pool.map(garden.grow, starts) if one is not None]
+    if axis:
+        grown = [one for one in grown if are_along(one.model[None, 3:6], axis[0], axis[1])[0]]
+    modes = shift_to_modes(
+        np.array([one.model for one in grown]).reshape(-1, 7), math.radians(config.bandwidth_deg), config.bandwidth
+    )
+    found = []
+    for model, members in modes:
+        if len(members) >= max(1.0, config.min_share * len(grown)):
+            ends = np.concatenate([grown[k].ends for k in members])
+            found.append(Proposal.spanning(model[:3], model[3:6], float(model[6]), ends, len(members)))
+    return found[:most]
+
+
+class _Garden:
+    """The oriented points that cylinders grow among.
+
+    Parameters
+    ----------
+    frame : Frame
+    normals : ndarray of shape (N, 3)
+    radii : tuple of float
+        Least and greatest radius, frame units.
+    config : TranConfig
+        Resolved.
+    """
+
+    def __init__(self, frame: Frame, normals: FloatArray, radii: tuple[float, float], config: TranConfig) -> None:
+        self._points = frame.points
+        self._normals = normals
+        self._radii = radii
+        self._config = config
+        self._distance = (config.distance or 0.0) / frame.spacing
+        self._cells = Cells(frame.points, frame.codes)
+        self._tree = cKDTree(frame.points)
+
+    def curved_starts(self, drawn: IndexArray) -> list[IndexArray]:
+        """Give the neighbourhoods of those points about which the normals spread along one direction."""
+        wanted = min(self._config.start_neighbours, len(self._points))
+        starts = []
+        for near in self._tree.query(self._points[drawn], k=wanted)[1].reshape(len(drawn), -1):
+            normals = self._normals[near]
+            normals = normals * np.where(normals @ normals[0] < 0.0, -1.0, 1.0)[:, None]
+            spreads = np.linalg.eigvalsh(np.cov(normals.T))
+            if spreads[2] >= self._config.min_curvature * spreads[1]:
+                starts.append(near)
+        return starts
+
+    def grow(self, start: IndexArray) -> Grown | None:
+        """Fit a cylinder and gather its inliers in turns, and tell whether it is valid."""
+        place = self._points[start[0]]
+        reach = float(np.linalg.norm(self._points[start] - place, axis=1).max())
+        inliers, agreement = start, 0.0
+        model = np.empty(7)
+        for _ in range(self._config.iterations):
+            if len(inliers) < 6:
+                return None
+            fitted = self._fit(inliers[:: max(1, len(inliers) // MOST)], place)
+            if fitted is None:
+                return None
+            model = fitted
+            reach *= GROWTH
+            inliers, agreement = self._gather(model, place, reach)
+        if len(inliers) < self._config.min_support or agreement < self._config.min_agreement:
+            return None
+        heights, _, angles = cylinder_coordinates(self._points[inliers], model[:3], model[3:6])
+        if covered_angle(angles) < math.radians(self._config.min_coverage_deg):
+            return None
+        return Grown(model, self._points[inliers[[int(heights.argmin()), int(heights.argmax())]]])
+
+    def _fit(self, inliers: IndexArray, place: FloatArray) -> FloatArray | None:
+        """Give the cylinder whose axis is across all normals, and whose circle fits the points seen along it."""
+        normals = self._normals[inliers]
+        direction = canonical_direction(np.linalg.eigh(normals.T @ normals)[1][:, 0])
+        across = np.column_stack(axis_frame(direction))
+        circle = fit_circle((self._points[inliers] - place) @ across)
+        if circle is None or not self._radii[0] <= circle[1] <= self._radii[1]:
+            return None
+        return np.concatenate([place + across @ circle[0], direction, [circle[1]]])
+
+    def _gather(self, model: FloatArray, place: FloatArray, reach: float) -> tuple[IndexArray, float]:
+        """Give the points near the surface and the seed whose normals agree, and their share of all that are near."""
+        radius = float(model[6])
+        inner, outer = max(0.0, radius - self._distance), radius + self._distance
+        near = self._cells.near_cylinder(model, -reach, reach, inner, outer)
+        near = near[((self._points[near] - place) ** 2).sum(axis=1) < reach * reach]
+        offsets = self._points[near] - model[:3]
+        offsets -= (offsets @ model[3:6])[:, None] * model[3:6]
+        cosines = np.abs((offsets * self._normals[near]).sum(axis=1)) / np.linalg.norm(offsets, axis=1)
+        agree = cosines > math.cos(math.radians(self._config.normal_angle_deg))
+        return near[agree], float(agree.mean()) if len(agree) else 0.0
+
+
+def shift_to_modes(models: FloatArray, angle: float, length: float) -> list[tuple[FloatArray, IndexArray]]:
+    """Cluster cylinders by mean shift under a Gaussian kernel.
+
+    Parameters
+    ----------
+    models : ndarray of shape (n, 7)
+        Point of the axis, unit direction, radius; the point is where the cylinder is.
+    angle, length : float
+        Bandwidths: of axis angles, radians; of offsets and radii, in radii.
+
+    Returns
+    -------
+    list of (ndarray of shape (7,), ndarray of int64)
+        Each mode, and the cylinders that lead to it; the mode of most first.
+    """
+    modes: list[FloatArray] = []
+    members: list[list[int]] = []
+    for k in range(len(models)):
+        mode = _shifted(models[k], models, angle, length)
+        known = [i for i, other in enumerate(modes) if _squared_distances(mode, other[None], angle, length)[0] < 1.0]
+        if known:
+            members[known[0]].append(k)
+        else:
+            modes.append(mode)
+            members.append([k])
+    order = sorted(range(len(modes)), key=lambda i: -len(members[i]))
+    return [(modes[i], np.array(members[i])) for i in order]
+
+
+def _shifted(model: FloatArray, models: FloatArray, angle: float, length: float) -> FloatArray:
+    """Move a cylinder to the weighted mean of those about it until it stays."""
+    for _ in range(SHIFTS):
+        weights = np.exp(-0.5 * _squared_distances(model, models, angle, length))
+        weights /= weights.sum()
+        signs = np.where(models[:, 3:6] @ model[3:6] < 0.0, -1.0, 1.0)
+        direction = canonical_direction((weights * signs) @ models[:, 3:6])
+        point = weights @ _feet(model[:3], models)
+        moved = np.concatenate([point, direction, [weights @ models[:, 6]]])
+        still = _squared_distances(model, moved[None], angle, length)[0] < STILL**2
+        model = moved
+        if still:
+            break
+    return model
+
+
+def _squared_distances(model: FloatArray, models: FloatArray, angle: float, length: float) -> FloatArray:
+    """Give squared distances of cylinders (n, 7) from one, in bandwidths, shape (n,)."""
+    cosines = np.clip(np.abs(models[:, 3:6] @ model[3:6]), 0.0, 1.0)
+    offsets = np.linalg.norm(_feet(model[:3], models) - model[:3], axis=1)
+    scale = length * model[6]
+    return np.asarray(
+        (np.arccos(cosines) / angle) ** 2 + (offsets / scale) ** 2 + ((models[:, 6] - model[6]) / scale) ** 2
+    )
+
+
+def _feet(point: FloatArray, models: FloatArray) -> FloatArray:
+    """Give the points nearest to one on the axes of cylinders (n, 7), shape (n, 3)."""
+    along = ((point - models[:, :3]) * models[:, 3:6]).sum(axis=1)
+    return np.asarray(models[:, :3] + along[:, None] * models[:, 3:6])

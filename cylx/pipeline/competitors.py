@@ -1,0 +1,91 @@
+"""The paper's competitors at the place of its method: the same cloud, limits, extents, labels and answer."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+
+from cylx.baselines import Proposal, find_by_consensus, find_by_growing, find_by_spheres, fit_line_of_centres
+from cylx.config import Config
+from cylx.geometry.cells import Cells
+from cylx.measures import covered_angle
+from cylx.pipeline.conclusion import conclude
+from cylx.pipeline.journal import Journal
+from cylx.pipeline.limits import out_of_range
+from cylx.pipeline.sources import ellipses_of_slices
+from cylx.records import Extraction, Finding, Frame, Ground, PointCloud, Refusal
+from cylx.scene import make_frame, radius_range, resolve
+from cylx.stages.averaging import measure_extent
+from cylx.stages.labelling import surface_points
+
+
+def extract_by_competitor(cloud: PointCloud, config: Config, threads: int, journal: Journal) -> Extraction:
+    """Find the cylinders of a cloud by the method that the configuration names.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    config : Config
+        Its method is not `gt`.
+    threads : int
+        Does not change the result.
+    journal : Journal
+
+    Returns
+    -------
+    Extraction
+        Of cylinders without confidence, payoff and covariance.
+
+    Raises
+    ------
+    ConfigError
+        If the method needs open3d, and it cannot be imported.
+    """
+    with journal.stage("scene"):
+        frame, scene = make_frame(cloud.points, config)
+        config = resolve(config, scene)
+        radii = radius_range(config, frame)
+        ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), frame.noise)
+    with journal.stage(config.method):
+        proposals = _proposals(frame, radii, config, threads, journal)
+    with journal.stage("labelling"):
+        outcomes = [_with_extent(proposal, ground, radii, config) for proposal in proposals]
+        findings = [one for one in outcomes if isinstance(one, Finding)]
+        refused = [one for one in outcomes if isinstance(one, Refusal)]
+        journal.report(config.method, len(proposals), len(findings), Counter(one.reason for one in refused))
+        return conclude(cloud, frame, scene, ground, findings, refused, journal.reports, config)
+
+
+def _proposals(
+    frame: Frame, radii: tuple[float, float], config: Config, threads: int, journal: Journal
+) -> list[Proposal]:
+    """Run the method."""
+    if config.method == "line-fit":
+        fits = ellipses_of_slices(frame, np.zeros(len(frame.points)), radii, config, threads, journal)
+        return fit_line_of_centres(fits, frame, config.line_fit)
+    axis = None
+    if config.scene.axis is not None:
+        along = np.array(config.scene.axis, dtype=np.float64)
+        axis = along / np.linalg.norm(along), math.radians(config.scene.axis_tolerance_deg)
+    most, seed = config.max_cylinders, config.seed
+    if config.method == "msac":
+        return find_by_consensus(frame, radii, axis, config.msac, most=most, seed=seed, threads=threads)
+    if config.method == "tran":
+        return find_by_growing(frame, radii, axis, config.tran, most=most, seed=seed, threads=threads)
+    return find_by_spheres(frame, radii, axis, config.jin, most=most, seed=seed, threads=threads)
+
+
+def _with_extent(proposal: Proposal, ground: Ground, radii: tuple[float, float], config: Config) -> Finding | Refusal:
+    """Give a cylinder the extent that is seen of it, or else that of what it was found on; hold it to the limits."""
+    segment, support = proposal
+    if reason := out_of_range(segment, radii, config.scene):
+        return Refusal(segment, reason, support, 0.0)
+    seen = measure_extent(segment, ground)
+    segment = segment if isinstance(seen, str) else seen
+    points, _, angles = surface_points(segment, ground)
+    coverage = covered_angle(angles)
+    if coverage < math.radians(config.verification.min_coverage_deg):
+        return Refusal(segment, "coverage", support, 0.0, coverage=coverage)
+    return Finding(segment, points, support, 0.0, 0.0, coverage, 0.0, 0.0)
