@@ -9,8 +9,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "baselines", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry",
-    "io", "measures", "noise", "open3d_door", "payoff", "pipeline", "records", "rejections", "results", "scene",
+    "api", "baselines", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "experiments", "game",
+    "geometry", "io", "measures", "noise", "open3d_door", "payoff", "pipeline", "records", "rejections", "results", "scene",
     "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
@@ -19,6 +19,7 @@ MAY_IMPORT = {
     "cli": EVERYTHING,
     "api": {"config", "errors", "io", "pipeline", "records"},
     "consensus": {"records"},
+    "experiments": {"config", "cylx", "errors", "geometry", "open3d_door", "pipeline", "records", "synthetic"},
     "measures": {"geometry", "records"},
     "pipeline": {
         "baselines",
@@ -57,6 +58,7 @@ OWN_SECTION = {
 ONLY_IN = {
     "click": "cli",
     "laspy": "io",
+    "matplotlib": "experiments",
     "libusb_package": "open3d_door",
     "open3d": "open3d_door",
     "plyfile": "io",

@@ -40,7 +40,7 @@ DRAWN = 4
 """Points drawn for each seed that is wanted; those on flat surface are no seeds."""
 GROWTH = 1.5
 """Factor of the neighbourhood's radius an iteration."""
-MOST = 4000
+MOST = 2000
 """Points of a neighbourhood that suffice for a fit."""
 SHIFTS = 50
 STILL = 1e-4
@@ -187,10 +187,11 @@ class _Garden:
         radius = float(model[6])
         inner, outer = max(0.0, radius - self._distance), radius + self._distance
         near = self._cells.near_cylinder(model, -reach, reach, inner, outer)
-        near = near[((self._points[near] - place) ** 2).sum(axis=1) < reach * reach]
-        offsets = self._points[near] - model[:3]
-        offsets -= (offsets @ model[3:6])[:, None] * model[3:6]
-        cosines = np.abs((offsets * self._normals[near]).sum(axis=1)) / np.linalg.norm(offsets, axis=1)
+        away = self._points[near] - place
+        near = near[np.einsum("ij,ij->i", away, away) < reach * reach]
+        across = np.column_stack(axis_frame(model[3:6]))
+        offsets = (self._points[near] - model[:3]) @ across
+        cosines = np.abs(np.einsum("ij,ij->i", offsets, self._normals[near] @ across)) / np.hypot(*offsets.T)
         agree = cosines > math.cos(math.radians(self._config.normal_angle_deg))
         return near[agree], float(agree.mean()) if len(agree) else 0.0
 

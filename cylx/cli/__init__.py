@@ -21,6 +21,7 @@ from cylx.cli.options import debug_option
         "synth": "cylx.cli.synth",
         "evaluate": "cylx.cli.evaluate",
         "diff": "cylx.cli.diff",
+        "reproduce": "cylx.cli.reproduce",
     },
     examples=["cylx extract scan.ply", "cylx extract scan.ply -o - | jq '.cylinders | length'"],
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},

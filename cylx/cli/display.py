@@ -140,10 +140,10 @@ class Observers:
 
 
 @contextmanager
-def observed(observer: Observer, name: str) -> Iterator[None]:
+def observed(observer: Observer, name: str, total: int | None = None) -> Iterator[None]:
     """Report a step of the command itself as a stage."""
     started = perf_counter()
-    observer.stage_started(name, None)
+    observer.stage_started(name, total)
     yield
     observer.stage_finished(name, perf_counter() - started)
 

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.small_matrices import solve_in_place
+
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
@@ -64,7 +66,7 @@ def search_circle(
     return record
 
 
-def fit_circle(points: FloatArray, steps: int = 5) -> tuple[FloatArray, float] | None:
+def fit_circle(points: FloatArray, steps: int = 4) -> tuple[FloatArray, float] | None:
     """Fit a circle to points of the plane by least squares of the orthogonal distances, from Taubin's algebraic fit.
 
     Parameters
@@ -86,19 +88,33 @@ def fit_circle(points: FloatArray, steps: int = 5) -> tuple[FloatArray, float] |
     center, radius = _taubin(points - middle)
     if not (math.isfinite(radius) and radius > 0.0):
         return None
+    shape = np.array([*(middle + center), radius])
+    return (shape[:2], float(shape[2])) if _improve(points, shape, steps) else None
+
+
+@njit(cache=True, nogil=True)
+def _improve(points: FloatArray, shape: FloatArray, steps: int) -> bool:
+    """Move a circle, `shape` (3,) of centre and radius, to the least squares of the orthogonal distances."""
+    matrix, right = np.empty((3, 3)), np.empty(3)
     for _ in range(steps):
-        offsets = points - middle - center
-        distances = np.hypot(offsets[:, 0], offsets[:, 1])
-        if not distances.all():
-            return None
-        rows = np.column_stack([offsets / distances[:, None], np.ones(len(points))])
-        step, _, rank, _ = np.linalg.lstsq(rows, distances - radius, rcond=None)
-        if rank < 3:
-            return None
-        center, radius = center + step[:2], radius + float(step[2])
-        if not 0.0 < radius < math.inf:
-            return None
-    return middle + center, radius
+        cc, cs, ss, c, s, rc, rs, r = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(len(points)):
+            x, y = points[i, 0] - shape[0], points[i, 1] - shape[1]
+            distance = math.sqrt(x * x + y * y) + 1e-300
+            cosine, sine, residual = x / distance, y / distance, distance - shape[2]
+            cc, cs, ss, c, s = cc + cosine * cosine, cs + cosine * sine, ss + sine * sine, c + cosine, s + sine
+            rc, rs, r = rc + residual * cosine, rs + residual * sine, r + residual
+        matrix[0, 0], matrix[0, 1], matrix[0, 2] = cc, cs, c
+        matrix[1, 0], matrix[1, 1], matrix[1, 2] = cs, ss, s
+        matrix[2, 0], matrix[2, 1], matrix[2, 2] = c, s, float(len(points))
+        right[0], right[1], right[2] = rc, rs, r
+        if not solve_in_place(matrix, right):
+            return False
+        for d in range(3):
+            shape[d] += right[d]
+        if not 0.0 < shape[2] < 1e12:
+            return False
+    return True
 
 
 def _taubin(points: FloatArray) -> tuple[FloatArray, float]:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from cylx.io.clouds import read_cloud as read_cloud
     from cylx.io.clouds import write_cloud as write_cloud
     from cylx.io.inputs import read_json as read_json
+    from cylx.io.meshes import read_object as read_object
     from cylx.io.outputs import check_writable as check_writable
     from cylx.io.outputs import write_bytes as write_bytes
     from cylx.io.outputs import write_text as write_text
@@ -23,6 +24,7 @@ _HOMES = {
     "cylinder_colors": "cylx.io.annotated",
     "read_cloud": "cylx.io.clouds",
     "read_json": "cylx.io.inputs",
+    "read_object": "cylx.io.meshes",
     "write_annotated": "cylx.io.annotated",
     "write_bytes": "cylx.io.outputs",
     "write_cloud": "cylx.io.clouds",

@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from single import covariance_bound, errors_of, mean_length, outlier_information
+from single import errors_of
 from tables import Bars, print_header, print_row
 
 from cylx.config import Config
+from cylx.geometry.bounds import covariance_bound, mean_length, outlier_information
 from cylx.geometry.cylinder import Cylinder, axis_frame
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud

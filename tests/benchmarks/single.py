@@ -8,65 +8,15 @@ import argparse
 import statistics
 import sys
 import time
-from itertools import pairwise
 
 import numpy as np
-from scipy.integrate import quad
 from tables import Bars, print_header, print_row
 
 import cylx
+from cylx.geometry.bounds import mean_errors_at_bound
 from cylx.synthetic import single
 
 QUANTITIES = ("axis angle, °", "axis offset, r", "radius error, %")
-
-
-def outlier_information(sigma, sigma_o, p):
-    """Give the Fisher information about the location of (1 - p) N(0, sigma²) + p N(0, sigma_o²), times sigma²."""
-    if p == 0 or sigma == sigma_o:
-        return 1.0
-
-    def integrand(e):
-        inner = (1 - p) / sigma * np.exp(-0.5 * (e / sigma) ** 2)
-        outer = p / sigma_o * np.exp(-0.5 * (e / sigma_o) ** 2)
-        density = inner + outer
-        slope = e * (inner / sigma**2 + outer / sigma_o**2)
-        return slope**2 / density / np.sqrt(2 * np.pi) if density > 0 else 0.0
-
-    narrow, wide = sorted((sigma, sigma_o))
-    edges = [0.0, narrow, 3 * narrow, 6 * narrow, 6 * narrow + wide, 6 * narrow + 3 * wide, 12 * wide + 6 * narrow]
-    half = sum(quad(integrand, low, high)[0] for low, high in pairwise(edges))
-    return 2 * half * sigma**2
-
-
-def covariance_bound(points, height, theta, sigma, information=1.0):
-    """Give the bound on the covariance of (offset along the view, offset across, two tilts, radius).
-
-    Unit radius; points even over the height and over an arc of `theta` radians about the first axis. A point at angle
-    phi and height z tells of (cos phi, sin phi, z cos phi, z sin phi, 1) times these parameters, with noise sigma.
-    """
-    mean_cos = np.sin(theta / 2) / (theta / 2)
-    cos_cos = (1 + np.sin(theta) / theta) / 2
-    sin_sin = 1 - cos_cos
-    fisher = np.zeros((5, 5))
-    fisher[np.ix_([0, 1, 4], [0, 1, 4])] = [[cos_cos, 0, mean_cos], [0, sin_sin, 0], [mean_cos, 0, 1]]
-    fisher[[2, 3], [2, 3]] = height**2 / 12 * np.array([cos_cos, sin_sin])
-    return np.linalg.inv(fisher * points * information / sigma**2)
-
-
-def mean_length(covariance):
-    """Give the mean length of a Gaussian vector in the plane: sqrt(pi/2) times the mean sd over all directions."""
-    variances = np.linalg.eigvalsh(covariance)
-    turn = np.pi * (np.arange(4096) + 0.5) / 4096
-    sd = np.sqrt(variances[0] * np.cos(turn) ** 2 + variances[1] * np.sin(turn) ** 2)
-    return np.sqrt(np.pi / 2) * float(sd.mean())
-
-
-def mean_errors_at_the_bound(a):
-    """Give the least mean angle (degrees), offset (radii) and radius error (%)."""
-    information = outlier_information(a.sigma, a.sigma_o, a.p)
-    covariance = covariance_bound(a.points, a.height, np.radians(a.theta), a.sigma, information)
-    angle = np.degrees(mean_length(covariance[2:4, 2:4]))
-    return angle, mean_length(covariance[:2, :2]), 100 * np.sqrt(2 / np.pi * covariance[4, 4])
 
 
 def errors_of(true, found):
@@ -115,7 +65,7 @@ def main():
     print_header(
         f"{a.preset}, {len(errors)} of {a.trials} found", "mean", "median", "max", "bound", "mean / bound", "bar"
     )
-    bounds = mean_errors_at_the_bound(a)
+    bounds = mean_errors_at_bound(a.points, a.height, np.radians(a.theta), a.sigma, a.sigma_o, a.p)
     for name, values, bound, bar in zip(
         QUANTITIES, errors.T, bounds, (a.max_angle, a.max_offset, a.max_radius), strict=True
     ):

@@ -1,0 +1,214 @@
+"""`cylx reproduce`: the paper's experiments, run again."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING
+
+import click
+
+from cylx.cli.failures import tell
+from cylx.cli.group import ExampleCommand
+from cylx.cli.options import complete_files, debug_option, talking
+from cylx.errors import OutputError, UsageError
+
+if TYPE_CHECKING:
+    from cylx.cli.display import Conversation
+    from cylx.experiments import Figure, ObjectScan, Summary, Trials
+
+NUMBERS = tuple(str(number) for number in range(5, 13))
+SAVED_EVERY = 5.0
+"""Seconds between two saves of the trials."""
+
+
+@click.command(
+    cls=ExampleCommand,
+    examples=["cylx reproduce 7 --trials 10", "cylx reproduce 11 --data 005_tomato_soup_can.ply --out experiments/"],
+)
+@click.argument("figures", metavar="FIGURE...", nargs=-1, required=True, type=click.Choice((*NUMBERS, "all")))
+@click.option(
+    "--trials", type=click.IntRange(min=1), metavar="N", default=100, show_default=True, help="Of each setting."
+)
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use.  [default: one a core]")
+@click.option(
+    "--curves",
+    metavar="NAMES",
+    help="Only these methods, separated by commas: gt, msac, line-fit, tran, jin, auto.  [default: all]",
+)
+@click.option(
+    "--out",
+    metavar="FOLDER",
+    default="experiments",
+    show_default=True,
+    shell_complete=complete_files,
+    help="Where the tables and pictures go; trials that are there already are not run again.",
+)
+@click.option(
+    "--data",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Scan of an upright can for figures 11 and 12, such as the tomato soup can of the YCB objects.",
+)
+@talking
+@debug_option
+def reproduce(
+    *,
+    figures: tuple[str, ...],
+    trials: int,
+    jobs: int | None,
+    curves: str | None,
+    out: str,
+    data: str | None,
+    talk: Conversation,
+) -> None:
+    """Run the paper's experiments again: its figures 5 to 12, or all.
+
+    For each figure this writes figure-N.csv, a line a trial, and figure-N.png, and a table of means goes to standard
+    output. What is interrupted goes on where it was. Times are those of this machine, of one thread in each of --jobs
+    processes.
+    """
+    from cylx.experiments import FIGURES
+    from cylx.io import read_object
+
+    numbers = sorted({int(name) for name in NUMBERS if name in figures or "all" in figures})
+    chosen = [_only(FIGURES[number], curves) for number in numbers]
+    if data is None and any(figure.needs_scan for figure in chosen):
+        needing = " and ".join(str(figure.number) for figure in chosen if figure.needs_scan)
+        raise UsageError("--data", f"figure {needing} needs the scan of a can", "give one by --data FILE")
+    study = Study(Path(out), trials, jobs or os.cpu_count() or 1, talk)
+    scan = None
+    if data is not None:
+        from cylx.experiments import ObjectScan
+
+        scan = ObjectScan.of(*read_object(data))
+    for figure in chosen:
+        study.run(figure, scan if figure.needs_scan else None)
+
+
+class Study:
+    """Figures that are run into a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    trials : int
+        Of each setting.
+    jobs : int
+        Processes.
+    talk : Conversation
+
+    Raises
+    ------
+    OutputError
+        If the folder cannot be made.
+    """
+
+    def __init__(self, folder: Path, trials: int, jobs: int, talk: Conversation) -> None:
+        self.folder = folder
+        self.trials = trials
+        self.jobs = jobs
+        self.talk = talk
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            fault = f"cannot be made: {(error.strerror or str(error)).lower()}"
+            raise OutputError(str(folder), fault, "give another folder by --out") from None
+
+    def run(self, figure: Figure, scan: ObjectScan | None) -> None:
+        """Run what is missing of a figure, draw it, and show its means.
+
+        Raises
+        ------
+        OutputError
+            If its files cannot be written, or are something else.
+        UsageError
+            If matplotlib is not installed.
+        """
+        from cylx.cli.display import observed
+        from cylx.experiments import draw, run_tasks, summarize, tasks_of
+        from cylx.io import check_writable, write_bytes
+
+        table, picture = self.folder / f"figure-{figure.number}.csv", self.folder / f"figure-{figure.number}.png"
+        check_writable(picture, overwrite=True)
+        done = self._read(table)
+        draw(figure, summarize(figure, done), done)  # what is needed for the picture is there
+        tasks = tasks_of(figure, self.trials, done)
+        with self.talk.progress() as observer, observed(observer, f"figure {figure.number}", len(tasks)):
+            saved = monotonic()
+            try:
+                for key, outcome in run_tasks(tasks, self.jobs, scan):
+                    done[key] = outcome
+                    observer.stage_advanced(1)
+                    if monotonic() - saved > SAVED_EVERY:
+                        self._write(table, done)
+                        saved = monotonic()
+            finally:
+                self._write(table, done)
+        wanted = {key: outcome for key, outcome in done.items() if key.trial < self.trials}
+        summaries = summarize(figure, wanted)
+        write_bytes(picture, draw(figure, summaries, wanted), overwrite=True)
+        _show(figure, summaries)
+        self.talk.say(f"figure {figure.number}: {len(tasks)} trials run, written to {table} and {picture}")
+
+    def _read(self, table: Path) -> Trials:
+        """Read the trials that are done."""
+        from cylx.experiments import parse_trials
+        from cylx.io import check_writable
+
+        check_writable(table, overwrite=True)
+        if not table.exists():
+            return {}
+        try:
+            trials = parse_trials(table.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError):
+            trials = None
+        if trials is None:
+            raise OutputError(str(table), "is there, and is no table of trials", "give another folder by --out")
+        return trials
+
+    def _write(self, table: Path, trials: Trials) -> None:
+        """Save all trials."""
+        from cylx.experiments import header_line, trial_lines
+        from cylx.io import write_text
+
+        write_text(table, header_line() + trial_lines(sorted(trials.items())), overwrite=True)
+
+
+def _only(figure: Figure, curves: str | None) -> Figure:
+    """Leave the cells of some methods."""
+    if curves is None:
+        return figure
+    from cylx.experiments.figures import METHODS
+
+    names = [name.strip() for name in curves.split(",")]
+    for name in names:
+        if name not in METHODS:
+            raise UsageError(f"--curves {curves}", f"'{name}' is no method", f"the methods are {', '.join(METHODS)}")
+    cells = tuple(cell for cell in figure.cells if cell.method in names)
+    if not cells:
+        raise UsageError(f"--curves {curves}", f"figure {figure.number} has none of them", "leave --curves out")
+    return figure._replace(cells=cells)
+
+
+def _show(figure: Figure, summaries: list[Summary]) -> None:
+    """Show the means, and how many times the bound they are."""
+    from cylx.cli.display import show_table
+
+    errors = figure.kind in {"cylinder", "cans"}
+    shown = {"cylinder": (0, 1, 2), "cans": (0,)}.get(figure.kind, (3,))
+    names = ("angle, °", "offset, r", "radius, %", "seconds")
+    header = ["panel", "curve", "x", "trials", "found", *(names[i] for i in shown)]
+    bounded = figure.kind == "cylinder"
+    header += ["angle / bound", "offset / bound", "radius / bound"] if bounded else []
+    rows = []
+    for summary in summaries:
+        cell = summary.cell
+        numbers = [f"{summary.means[i]:.3g} ± {summary.errors[i]:.1g}" for i in shown]
+        over = [f"{summary.means[i] / summary.bound[i]:.2f}" for i in shown] if summary.bound else []
+        rows.append(
+            [cell.panel, cell.curve, f"{cell.x:g}", str(summary.trials), f"{summary.found:.2f}", *numbers, *over]
+        )
+    tell(f"figure {figure.number}: {figure.title}" + (", mean ± standard error" if errors else ""))
+    show_table(header, rows)

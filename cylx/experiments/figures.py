@@ -1,0 +1,186 @@
+"""The paper's figures 5 to 12 as lists of cells: what is varied, over what, with which methods.
+
+Where the paper gives a number it is used. It does not give the number of points (10 000 here), the height (4 radii), p
+of eq. 2 and the thickness of slices (as in the `paper` preset), the two shares of outliers of figure 5 (0.1 and 0.4,
+with sigma = 0.01 and sigma_o = 0.04), the distances of the methods other than MSAC (as of MSAC), nor most of the places
+of the points along the x axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+POINTS, HEIGHT = 10_000, 4.0
+COMPETITORS = ("msac", "line-fit", "tran", "jin")
+METHODS = ("gt", *COMPETITORS, "auto")
+
+_UNIT = ("msac.distance=0.03", "tran.distance=0.03", "jin.distance=0.03", "jin.neighbourhood=1.2")
+_NOISY_TRAN = ("tran.neighbours=100", "tran.start_neighbours=200")
+
+
+class Cell(NamedTuple):
+    """One setting of a figure, tried many times.
+
+    Parameters
+    ----------
+    panel : str
+        Column of the figure.
+    curve : str
+        What the legend calls it.
+    x : float
+        Where it is on the x axis.
+    method : str
+        `gt` (the paper's), one of its competitors, or `auto`.
+    scene : tuple of (str, float)
+        Parameters of the scene.
+    settings : tuple of str
+        Of the form `section.key=value`.
+    """
+
+    panel: str
+    curve: str
+    x: float
+    method: str
+    scene: tuple[tuple[str, float], ...]
+    settings: tuple[str, ...] = ()
+
+
+class Figure(NamedTuple):
+    """A figure of the paper.
+
+    Parameters
+    ----------
+    number : int
+    title : str
+    kind : str
+        `cylinder`: one synthetic cylinder, three errors; `cans`: two scanned cans, the angle between them; `time` and
+        `cans time`: seconds.
+    x_label : str
+    cells : tuple of Cell
+    logarithmic : bool
+        The y axis.
+    boxes : bool
+        Boxes rather than means.
+    """
+
+    number: int
+    title: str
+    kind: str
+    x_label: str
+    cells: tuple[Cell, ...]
+    logarithmic: bool = False
+    boxes: bool = False
+
+    @property
+    def needs_scan(self) -> bool:
+        """Whether it takes the scan of an object."""
+        return self.kind.startswith("cans")
+
+    @property
+    def panels(self) -> list[str]:
+        """Columns, in order."""
+        return list(dict.fromkeys(cell.panel for cell in self.cells))
+
+
+def _single(**changes: float) -> tuple[tuple[str, float], ...]:
+    """Give the parameters of a synthetic cylinder."""
+    return tuple({"points": POINTS, "height": HEIGHT, **changes}.items())
+
+
+def _of_methods(
+    panel: str, x: float, scene: tuple[tuple[str, float], ...], planes: int, settings: tuple[str, ...] = _UNIT
+) -> Iterator[Cell]:
+    """Give the cells of all methods at one place."""
+    for method in METHODS:
+        own = () if method == "auto" else (f"slicing.planes={planes}", *settings)
+        yield Cell(panel, method, x, method, scene, own)
+
+
+def _figure_5() -> Iterator[Cell]:
+    for panel, p in (("few outliers (p = 0.1)", 0.1), ("many outliers (p = 0.4)", 0.4)):
+        for theta in (50, 90, 135, 360):
+            scene = _single(sigma=0.01, sigma_o=0.04, p=p, theta_deg=theta)
+            for planes in (10, 20, 30, 40, 60, 90):
+                yield Cell(panel, f"gt {theta}°", planes, "gt", scene, (f"slicing.planes={planes}",))
+            yield Cell(panel, f"auto {theta}°", 40, "auto", scene)
+
+
+def _figure_6() -> Iterator[Cell]:
+    for panel, sigma in (("low noise (sigma = 0.001)", 0.001), ("high noise (sigma = 0.1)", 0.1)):
+        scene = _single(sigma=sigma, sigma_o=0.05, p=0.1)
+        for low in range(0, 90, 10):
+            about = (
+                f"slicing.inclination_deg=[{low}, {low + 10}]",
+                "scene.axis=[0, 0, 1]",
+                "scene.axis_tolerance_deg=90",
+            )
+            yield Cell(panel, "gt", low + 5, "gt", scene, ("slicing.planes=20", *about))
+
+
+def _figure_7() -> Iterator[Cell]:
+    for sigma in (0.001, 0.005, 0.01, 0.02, 0.03, 0.04, 0.05):
+        yield from _of_methods("", sigma, _single(sigma=sigma, sigma_o=0.04, p=0.3), 20)
+
+
+def _figure_8() -> Iterator[Cell]:
+    settings = (*_UNIT, *_NOISY_TRAN)
+    for p in (0.1, 0.2, 0.3, 0.4, 0.5):
+        yield from _of_methods("p, at sigma_o = 0.1", p, _single(sigma=0.001, sigma_o=0.1, p=p), 20, settings)
+    for sigma_o in (0.05, 0.1, 0.15, 0.2):
+        scene = _single(sigma=0.001, sigma_o=sigma_o, p=0.4)
+        yield from _of_methods("sigma_o, at p = 0.4", sigma_o, scene, 20, settings)
+
+
+def _figure_9() -> Iterator[Cell]:
+    for theta in (30, 50, 70, 90, 110, 135, 180, 270, 360):
+        yield from _of_methods("", theta, _single(sigma=0.005, sigma_o=0.01, p=0.1, theta_deg=theta), 40)
+
+
+def _figure_10() -> Iterator[Cell]:
+    for sigma in (0.001, 0.01, 0.03, 0.05):
+        yield from _of_methods("sigma, at p = 0.1", sigma, _single(sigma=sigma, sigma_o=0.05, p=0.1), 20)
+    for p in (0.1, 0.3, 0.5):
+        yield from _of_methods("p, at sigma = 0.01", p, _single(sigma=0.01, sigma_o=0.05, p=p), 20)
+
+
+def _of_scan_methods(panel: str, x: float, scene: dict[str, float], planes: int, iterations: int) -> Iterator[Cell]:
+    """Give the cells of all methods that find several cylinders; distances are put in with the scan's size."""
+    normals = ("msac.neighbours=80", "tran.neighbours=80", f"msac.iterations={iterations}")
+    for method in METHODS:
+        if method != "line-fit":
+            own = () if method == "auto" else (f"slicing.planes={planes}", *normals)
+            yield Cell(panel, method, x, method, tuple(scene.items()), own)
+
+
+def _figure_11() -> Iterator[Cell]:
+    for percent in (30, 50, 70, 100):
+        yield from _of_scan_methods("points kept, %", percent, {"share": percent / 100}, 40, 4000)
+    for panel, side in (
+        ("least angle of normal and view (0, 1, 0), °", 1.0),
+        ("the same from the other side, °", -1.0),
+    ):
+        for view in (0, 30, 60, 90, 105, 120):
+            scene = {"share": 0.8, "view_deg": float(view), "side": side}
+            yield from _of_scan_methods(panel, view, scene, 50, 5000)
+
+
+def _figure_12() -> Iterator[Cell]:
+    for points in (300_000, 500_000, 700_000, 1_000_000):
+        yield from _of_scan_methods("", points / 1000, {"cans": 5, "points": points}, 20, 5000)
+
+
+FIGURES = {
+    figure.number: figure
+    for figure in (
+        Figure(5, "planes and coverage", "cylinder", "slicing planes", tuple(_figure_5())),
+        Figure(6, "inclination of planes", "cylinder", "angle of normals and axis, °", tuple(_figure_6()), boxes=True),
+        Figure(7, "Gaussian noise", "cylinder", "sigma, radii", tuple(_figure_7()), logarithmic=True),
+        Figure(8, "outliers", "cylinder", "share, or magnitude in radii", tuple(_figure_8()), logarithmic=True),
+        Figure(9, "coverage", "cylinder", "coverage, °", tuple(_figure_9()), logarithmic=True),
+        Figure(10, "time of one cylinder", "time", "share, or sigma in radii", tuple(_figure_10()), logarithmic=True),
+        Figure(11, "two cans", "cans", "", tuple(_figure_11()), logarithmic=True),
+        Figure(12, "time of five cans", "cans time", "thousand points", tuple(_figure_12()), logarithmic=True),
+    )
+}  # fmt: skip
+"""By number."""

@@ -1,0 +1,82 @@
+"""The trials of a figure as a CSV file that grows: what is in it is not run again."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from cylx import __version__
+from cylx.experiments.figures import Cell
+from cylx.experiments.trials import Outcome
+
+COLUMNS = ("panel", "curve", "x", "trial", "found", "angle_deg", "offset", "radius_percent", "seconds", "cylx_version")
+
+
+class Key(NamedTuple):
+    """Which trial of a figure.
+
+    Parameters
+    ----------
+    panel, curve : str
+    x : float
+    trial : int
+    """
+
+    panel: str
+    curve: str
+    x: float
+    trial: int
+
+    @classmethod
+    def of(cls, cell: Cell, trial: int) -> Key:
+        """Name a trial of a cell."""
+        return cls(cell.panel, cell.curve, float(cell.x), trial)
+
+
+Trials = dict[Key, Outcome]
+
+
+def parse_trials(text: str) -> Trials | None:
+    """Read the trials of this version of cylx; a line that was cut off, or is of another version, is passed over.
+
+    Parameters
+    ----------
+    text : str
+        Of the file.
+
+    Returns
+    -------
+    dict of Key to Outcome, or None
+        None if it is no such file.
+    """
+    rows = csv.reader(io.StringIO(text))
+    if tuple(next(rows, COLUMNS)) != COLUMNS:
+        return None
+    trials: Trials = {}
+    for row in rows:
+        if len(row) != len(COLUMNS) or row[-1] != __version__:
+            continue
+        try:
+            key = Key(row[0], row[1], float(row[2]), int(row[3]))
+            numbers = [float(cell) if cell else float("nan") for cell in row[5:9]]
+            trials[key] = Outcome(int(row[4]), *numbers)
+        except ValueError:
+            continue
+    return trials
+
+
+def header_line() -> str:
+    """Give the first line of the file."""
+    return ",".join(COLUMNS) + "\n"
+
+
+def trial_lines(trials: Iterable[tuple[Key, Outcome]]) -> str:
+    """Give the lines of some trials; what was not measured is empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    for key, outcome in trials:
+        numbers = ["" if value != value else f"{value:.6g}" for value in outcome[1:]]  # noqa: PLR0124  a NaN is empty
+        writer.writerow([key.panel, key.curve, f"{key.x:g}", key.trial, outcome.found, *numbers, __version__])
+    return text.getvalue()
