@@ -10,8 +10,8 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
     "api", "baselines", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "experiments", "game",
-    "geometry", "io", "measures", "noise", "open3d_door", "payoff", "pipeline", "records", "rejections", "results", "scene",
-    "stages", "synthetic",
+    "geometry", "io", "measures", "noise", "open3d_door", "payoff", "pipeline", "records", "rejections", "results",
+    "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},

@@ -157,8 +157,8 @@ def _figure_11() -> Iterator[Cell]:
     for percent in (30, 50, 70, 100):
         yield from _of_scan_methods("points kept, %", percent, {"share": percent / 100}, 40, 4000)
     for panel, side in (
-        ("least angle of normal and view (0, 1, 0), °", 1.0),
-        ("the same from the other side, °", -1.0),
+        ("least angle of normal and (0, 1, 0), °", 1.0),
+        ("least angle of normal and (0, -1, 0), °", -1.0),
     ):
         for view in (0, 30, 60, 90, 105, 120):
             scene = {"share": 0.8, "view_deg": float(view), "side": side}
