@@ -9,8 +9,8 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry", "io",
-    "measures", "noise", "payoff", "pipeline", "records", "rejections", "results", "scene", "stages", "synthetic",
+    "api", "catalogue", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "game", "geometry",
+    "io", "measures", "noise", "payoff", "pipeline", "records", "rejections", "results", "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},
@@ -19,23 +19,28 @@ MAY_IMPORT = {
     "api": {"config", "errors", "io", "pipeline", "records"},
     "consensus": {"records"},
     "measures": {"geometry", "records"},
-    "pipeline": {"config", "consensus", "errors", "game", "geometry", "measures", "records", "scene", "stages"},
-    "stages": {"config", "consensus", "errors", "evidence", "game", "geometry", "measures", "payoff", "records"},
+    "pipeline": {
+        "catalogue", "config", "consensus", "errors", "game", "geometry", "measures", "records", "scene", "stages",
+    },
+    "stages": {
+        "catalogue", "config", "consensus", "errors", "evidence", "game", "geometry", "measures", "payoff", "records",
+    },
     "noise": {"geometry"},
     "payoff": {"game", "geometry"},
-    "scene": {"config", "errors", "geometry", "noise", "records"},
+    "scene": {"catalogue", "config", "errors", "geometry", "noise", "records"},
     "results": {"config", "cylx", "errors", "geometry", "records"},
     "rejections": {"cylx", "records", "results"},
     "io": {"errors", "geometry", "records"},
-    "records": {"config", "geometry"},
+    "records": {"catalogue", "config", "geometry"},
     "config": {"errors"},
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors"},
+    "catalogue": set(),
     "evidence": set(),
     "geometry": set(),
     "game": set(),
     "errors": set(),
-}
+}  # fmt: skip
 OWN_SECTION = {
     "curvature": "CandidatesConfig",
     "local_slices": "SlicingConfig",
