@@ -70,7 +70,19 @@ def configuration():
         ]
         heading = f"### {section}\n\n{sentence}" if section else "### Top level"
         parts.append(f"{heading}\n\n" + table(["key", "default", "unit", "allowed", "meaning"], rows))
+        parts += [entry_keys(key, entry) for key, entry in entries.items() if "$ref" in str(entry)]
     return "\n\n".join(parts)
+
+
+def entry_keys(key, entry):
+    """Write the keys of an entry of a list."""
+    definition = Config.model_json_schema()["$defs"][re.search(r"#/\$defs/(\w+)", str(entry))[1]]
+    rows = [
+        [f"`{name}`", f"`{_scalar(part['default'])}`" if "default" in part else "none", unit_of(part), _allowed(part)]
+        + [part["description"]]
+        for name, part in definition["properties"].items()
+    ]
+    return f"#### An entry of {key}\n\n" + table(["key", "default", "unit", "allowed", "meaning"], rows)
 
 
 def dotted(values, prefix=""):
