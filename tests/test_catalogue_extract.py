@@ -122,6 +122,19 @@ def test_it_goes_with_a_known_direction(arc):
     assert found["uncertainty"]["axis_angle_deg"] == pytest.approx(0.001 * np.sqrt(2), rel=0.05)
 
 
+def test_an_oval_is_moved_by_what_its_covariance_says():
+    points = np.array(single(points=4000, sigma=0.003, seed=5).points)
+    points[:, :2] *= [1.004, 0.996]
+    before, after = (only(extract(points, catalogue=[{"radius": r, "tolerance": 5e-4}])) for r in (3.0, 1.001))
+    assert before["evidence"]["lack_of_fit"] > 1.4
+    assert after["catalogue"]["decision"] == "snapped"
+    assert after["catalogue"]["free_radius_sd"] == pytest.approx(before["uncertainty"]["radius"], rel=1e-9)
+    variance = before["uncertainty"]["radius"] ** 2
+    gain = variance / (variance + 5e-4**2)
+    assert after["radius"] - before["radius"] == pytest.approx(gain * (1.001 - before["radius"]), rel=1e-6)
+    assert after["uncertainty"]["radius"] ** 2 == pytest.approx((1 - gain) * variance, rel=1e-6)
+
+
 def test_what_has_no_covariance_has_no_match(arc):
     found = extract(arc.points, overrides=["averaging.refine=false"], max_cylinders=1, catalogue=LISTED)
     assert not {"catalogue", "uncertainty"} & set(only(found))
