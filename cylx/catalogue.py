@@ -15,8 +15,8 @@ from typing import Literal, NamedTuple
 Decision = Literal["snapped", "ambiguous", "none"]
 
 DECISIVE = 20.0
-"""Least likelihood ratio of an entry to each of its rivals. Where one cylinder in 20 of a plant is of no entry of a
-catalogue of 20, the odds of the entry are as great."""
+"""Least likelihood ratio of an entry to each of its rivals; against one that was as likely beforehand, the entry is
+right in 20 cases of 21."""
 NEAR = 3.0
 """Most standard deviations between a radius and the entry that it is taken for."""
 WIDER = 2.0

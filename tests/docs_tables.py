@@ -77,11 +77,10 @@ def configuration():
 def entry_keys(key, entry):
     """Write the keys of an entry of a list."""
     definition = Config.model_json_schema()["$defs"][re.search(r"#/\$defs/(\w+)", str(entry))[1]]
-    rows = [
-        [f"`{name}`", f"`{_scalar(part['default'])}`" if "default" in part else "none", unit_of(part), _allowed(part)]
-        + [part["description"]]
-        for name, part in definition["properties"].items()
-    ]
+    rows = []
+    for name, part in definition["properties"].items():
+        default = f"`{_scalar(part['default'])}`" if "default" in part else "none"
+        rows.append([f"`{name}`", default, unit_of(part), _allowed(part), part["description"]])
     return f"#### An entry of {key}\n\n" + table(["key", "default", "unit", "allowed", "meaning"], rows)
 
 
