@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cylx.config import Config, check_tolerance, load_config
+from cylx.config_catalogue import Given
 from cylx.config_layers import named_options
 from cylx.io import read_cloud
 from cylx.pipeline import extract_cylinders
@@ -32,6 +33,7 @@ def extract(
     axis_tolerance_deg: float | None = None,
     axis_sd_deg: float | None = None,
     known_radius: tuple[float, float | None] | None = None,
+    catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
     threads: int | None = None,
     observer: Observer | None = None,
@@ -67,6 +69,9 @@ def extract(
     known_radius : pair of float, optional
         Radius that the cylinders are known to have, in the unit of the points, and its standard deviation (None: a
         thousandth of it): each fit is drawn to it that does not contradict it.
+    catalogue : str, Path, or sequence of mapping or float, optional
+        Nominal radii, in the unit of the points: a CSV or YAML file, entries with `name`, `radius` and `tolerance` as
+        in the configuration, or just radii. Each fit is drawn to the one that it bears out.
     min_coverage_deg : float, optional
         Smallest angle about its axis that must be seen of a cylinder, degrees.
     threads : int, optional
@@ -105,6 +110,7 @@ def extract(
         axis_tolerance_deg=axis_tolerance_deg,
         axis_sd_deg=axis_sd_deg,
         known_radius=known_radius,
+        catalogue=catalogue,
         min_coverage_deg=min_coverage_deg,
     )
     settings = load_config(

@@ -18,6 +18,7 @@ from cylx.config_layers import Layer, file_layer, merge, nested, override_layer,
 from cylx.config_sections import (
     AveragingConfig,
     CandidatesConfig,
+    CatalogueEntry,
     ClusteringConfig,
     EllipsesConfig,
     SceneConfig,
@@ -30,6 +31,7 @@ from cylx.errors import ConfigError
 __all__ = [
     "AveragingConfig",
     "CandidatesConfig",
+    "CatalogueEntry",
     "ClusteringConfig",
     "Config",
     "EllipsesConfig",
@@ -141,7 +143,7 @@ def load_config(
 
 
 def _check_known(scene: SceneConfig) -> None:
-    """Refuse a deviation of what is not known; layers, which are validated by themselves, may have it apart."""
+    """Refuse what makes sense only with something else, or without; layers are validated by themselves before."""
     pairs = {
         "known_radius_sd": (scene.known_radius_sd, scene.known_radius, "known_radius"),
         "axis_sd_deg": (scene.axis_sd_deg, scene.axis, "axis"),
@@ -149,16 +151,18 @@ def _check_known(scene: SceneConfig) -> None:
     for name, (deviation, value, needed) in pairs.items():
         if deviation is not None and value is None:
             raise ConfigError(f"scene.{name}", f"is given without scene.{needed}", "give that, too")
+    if scene.catalogue is not None and scene.known_radius is not None:
+        raise ConfigError("scene.catalogue", "contradicts scene.known_radius", "leave one of them out")
 
 
 def _check_method(config: Config) -> None:
     """Refuse what the other methods cannot do: they have no covariance for what is known to be weighed by."""
     if config.method == "gt":
         return
-    for name in ("known_radius", "axis_sd_deg"):
+    for name in ("known_radius", "axis_sd_deg", "catalogue"):
         if getattr(config.scene, name) is not None:
             fault = f"is for method gt alone, and the method is {config.method}"
-            raise ConfigError(f"scene.{name}", fault, "leave it out, or give scene.radius_min and scene.radius_max")
+            raise ConfigError(f"scene.{name}", fault, "leave it out, or use method gt")
 
 
 def check_tolerance(config: Config, options: Mapping[str, object]) -> None:

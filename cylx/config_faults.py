@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -84,14 +84,27 @@ def _suggest_key(path: tuple[str, ...], model: type[BaseModel]) -> str:
     if path[-1] in keys:
         above, _, key = path[-1].rpartition(".")
         return f"write '{key}' below '{above}:', indented"
-    section = "".join(f"{part}." for part in path[:-1])
-    siblings = [key.removeprefix(section) for key in keys if key.startswith(section)]
-    siblings = [key for key in siblings if "." not in key]
+    siblings = [field.alias or name for name, field in _model_at(path[:-1], model).model_fields.items()]
     if close := get_close_matches(path[-1], siblings, n=1):
         return f"did you mean '{close[0]}'?"
     if elsewhere := [key for key in keys if get_close_matches(path[-1], [key.rpartition(".")[2]], cutoff=0.8)]:
         return f"did you mean '{elsewhere[0]}'?"
     return f"the keys here are {', '.join(siblings)}"
+
+
+def _model_at(path: tuple[str, ...], model: type[BaseModel]) -> type[BaseModel]:
+    """Give the model of the section, or of the entry of a list, that a path leads to."""
+    for part in path:
+        field = model.model_fields.get(part)  # the number of an entry is no field, and leads no further
+        model = model if field is None else _model_in(field.annotation) or model
+    return model
+
+
+def _model_in(annotation: object) -> type[BaseModel] | None:
+    """Give the model that an annotation speaks of: itself, or of the entries of a list."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return next(filter(None, map(_model_in, get_args(annotation))), None)
 
 
 def _suggest_value(value: object, expected: str) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from importlib.resources import files
+from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from cylx.config_catalogue import Given, entries_of
 from cylx.errors import ConfigError
 from cylx.strict_yaml import parse_yaml
 
@@ -81,6 +83,7 @@ def named_options(
     axis_tolerance_deg: float | None = None,
     axis_sd_deg: float | None = None,
     known_radius: tuple[float, float | None] | None = None,
+    catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
 ) -> dict[str, object]:
     """Give the dotted keys that the named options of the command line and of `cylx.extract` stand for.
@@ -101,6 +104,8 @@ def named_options(
         Standard deviation of the cylinders' tilts from the axis, degrees.
     known_radius : pair of float, optional
         Radius that the cylinders are known to have, and its standard deviation or None, scene units.
+    catalogue : str, path-like, or sequence, optional
+        Nominal radii: a file of them, entries as in the configuration, or just radii, scene units.
     min_coverage_deg : float, optional
         Smallest angle about the axis that must be covered, degrees.
 
@@ -108,6 +113,11 @@ def named_options(
     -------
     dict
         The options that were given, for `load_config`.
+
+    Raises
+    ------
+    ConfigError
+        If the file of the catalogue cannot be read.
     """
     smallest, largest = radius or (None, None)
     known, known_sd = known_radius or (None, None)
@@ -123,6 +133,7 @@ def named_options(
         "scene.axis_sd_deg": axis_sd_deg,
         "scene.known_radius": known,
         "scene.known_radius_sd": known_sd,
+        "scene.catalogue": None if catalogue is None else entries_of(catalogue),
         "verification.min_coverage_deg": min_coverage_deg,
     }
     return {key: value for key, value in values.items() if value is not None}

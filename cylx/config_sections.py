@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[Number, Field(gt=0)]
@@ -19,6 +19,29 @@ class Section(BaseModel):
     """A part of the configuration: unknown keys, wrong types and impossible values are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+
+
+class CatalogueEntry(Section):
+    """A nominal radius."""
+
+    name: str | None = None
+    """What it is called, as in `DN50`: up to 40 printable characters."""
+    radius: Positive
+    """Nominal radius, scene units."""
+    tolerance: Positive | None = None
+    """Standard deviation of true radii about the nominal one, scene units; null is 0.2 % of it."""
+
+    @field_validator("name")
+    @classmethod
+    def _check_name(cls, name: str | None) -> str | None:
+        if name is not None and not (0 < len(name) <= 40 and name.isprintable() and name == name.strip()):
+            raise ValueError("the name is no name; write 1 to 40 printable characters without spaces around them")
+        return name
+
+    @property
+    def spread(self) -> float:
+        """The tolerance, scene units, also where it is null."""
+        return self.tolerance or 2e-3 * self.radius
 
 
 class SceneConfig(Section):
@@ -42,6 +65,8 @@ class SceneConfig(Section):
     """Radius the cylinders are known to have, scene units: each fit is drawn to it that does not contradict it."""
     known_radius_sd: Positive | None = None
     """Standard deviation of `known_radius`, scene units; null is a thousandth of it."""
+    catalogue: Annotated[list[CatalogueEntry], Field(min_length=1)] | None = None
+    """Nominal radii, each `{name: DN50, radius: 0.03015, tolerance: 0.0001}`: a fit is drawn to one it bears out."""
 
     @model_validator(mode="after")
     def _check_axis(self) -> SceneConfig:
@@ -53,6 +78,13 @@ class SceneConfig(Section):
     def _check_radii(self) -> SceneConfig:
         if self.radius_min is not None and self.radius_max is not None and self.radius_min > self.radius_max:
             raise ValueError(f"radius_min {self.radius_min:g} is above radius_max {self.radius_max:g}; swap them")
+        return self
+
+    @model_validator(mode="after")
+    def _check_catalogue(self) -> SceneConfig:
+        radii = [entry.radius for entry in self.catalogue or []]
+        if twice := [radius for radius in radii if radii.count(radius) > 1]:
+            raise ValueError(f"catalogue has the radius {twice[0]:g} twice; leave one of them out")
         return self
 
 

@@ -69,6 +69,8 @@ def _allowed(entry: _Object) -> str:
     """Say which values a key may have."""
     if "anyOf" in entry:
         return " or ".join(_allowed(choice) for choice in entry["anyOf"])
+    if "$ref" in entry:
+        return "entry"
     if "enum" in entry:
         return " or ".join(entry["enum"])
     if entry["type"] == "array":
@@ -81,4 +83,6 @@ def _allowed(entry: _Object) -> str:
 
 def _scalar(value: object) -> str:
     """Write one value in the flow style of YAML."""
-    return yaml.safe_dump(value, default_flow_style=True, width=1000).removesuffix("\n...\n").strip()
+    return (
+        yaml.safe_dump(value, default_flow_style=True, width=10**9, allow_unicode=True).removesuffix("\n...\n").strip()
+    )

@@ -119,6 +119,23 @@ class Uncertainty(Part):
         }
 
 
+class CatalogueMatch(Part):
+    """The most likely entry of the catalogue for a cylinder, and whether the cylinder was drawn to it."""
+
+    decision: Literal["snapped", "ambiguous", "none"]
+    """`snapped`: fitted again with its radius; `ambiguous`: it may be this one; `none`: it is none of them."""
+    name: str | None = None
+    """Name of the entry; absent if it has none."""
+    nominal_radius: Annotated[Number, Field(gt=0)]
+    """Radius of the entry, scene units."""
+    likelihood_ratio: Annotated[Number, Field(gt=0)]
+    """Of the entry to the stronger of its rivals: the second entry, or none at all; from 1e-9 to 1e9."""
+    free_radius: Annotated[Number, Field(gt=0)]
+    """Radius without the catalogue, scene units."""
+    free_radius_sd: Length
+    """Its standard deviation, scene units."""
+
+
 class Numbered(Part):
     """What has a number."""
 
@@ -184,10 +201,14 @@ class Measured(Part):
 class ResultCylinder(Measured, Numbered):  # the keys of the last one come first
     """A cylinder and the evidence for it."""
 
+    catalogue: CatalogueMatch | None = None
+    """What the catalogue has for it; absent without a catalogue, or where its uncertainty was not computed."""
+
     @classmethod
     def of(cls, index: int, fit: CylinderFit) -> ResultCylinder:
         """Write down cylinder number `index` of an extraction."""
-        return cls(id=index, **cls.keys_of(fit))
+        match = None if fit.nominal is None else CatalogueMatch.model_validate(fit.nominal, from_attributes=True)
+        return cls(id=index, **cls.keys_of(fit), catalogue=match)
 
 
 class Result(Part):
@@ -260,6 +281,7 @@ class Result(Part):
         """Give the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
         drop_missing([content["input"], *content["cylinders"]])
+        drop_missing(cylinder["catalogue"] for cylinder in content["cylinders"] if "catalogue" in cylinder)
         return content
 
     def to_json(self) -> str:

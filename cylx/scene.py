@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.catalogue import Catalogue
 from cylx.config import Config
 from cylx.errors import InputError
 from cylx.geometry.mixture_fit import Prior
@@ -252,6 +253,7 @@ def resolve(config: Config, scene: Scene) -> Config:
     Config
     """
     least, greatest, radius = config.scene.radius_min, config.scene.radius_max, config.scene.known_radius
+    catalogue = config.scene.catalogue
     thickness = config.slicing.thickness or 2.0 * max(scene.spacing, 2.0 * scene.noise)
     known = {
         "scene": {
@@ -260,6 +262,7 @@ def resolve(config: Config, scene: Scene) -> Config:
             "radius_min": least or min(max(3.0 * scene.noise, 0.25 * scene.spacing), greatest or math.inf),
             "radius_max": greatest or max(0.5 * scene.extent, least or 0.0),
             "known_radius_sd": config.scene.known_radius_sd or (radius and 1e-3 * radius),
+            "catalogue": catalogue and [entry.model_copy(update={"tolerance": entry.spread}) for entry in catalogue],
         },
         "slicing": {"thickness": thickness},
         "ellipses": {"tolerance": config.ellipses.tolerance or 4.0 * scene.noise + 0.06 * thickness},
@@ -290,3 +293,12 @@ def known_of(config: Config, frame: Frame) -> Prior | None:
     return Prior(
         radius, deviation, None if axis is None else axis / np.linalg.norm(axis), math.radians(scene.axis_sd_deg or 0.0)
     )
+
+
+def catalogue_of(config: Config, frame: Frame) -> Catalogue | None:
+    """Give the nominal radii in frame units, from a resolved configuration; None without a catalogue."""
+    entries = config.scene.catalogue
+    if entries is None:
+        return None
+    radii = tuple(entry.radius / frame.spacing for entry in entries)
+    return Catalogue(radii, tuple(entry.spread / frame.spacing for entry in entries))

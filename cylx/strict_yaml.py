@@ -59,6 +59,12 @@ def parse_yaml(text: str, place: str) -> object:
         raise ConfigError(place, fault, "give a YAML text file") from None
 
 
+def entry_lines(text: str) -> list[int]:
+    """Give the line of each entry of a list that `parse_yaml` has read."""
+    node = yaml.compose(text, Loader=yaml.SafeLoader)
+    return [item.start_mark.line + 1 for item in node.value] if isinstance(node, yaml.SequenceNode) else []
+
+
 def _refuse_anchors_and_tags(text: str, place: str) -> None:
     """Stop at the first anchor, alias, tag or deep nesting, before anything is composed of it."""
     depth = 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import cylx
-from cylx.config import load_config
+from cylx.config import CatalogueEntry, load_config
 from cylx.errors import ConfigError, InputError
 from cylx.records import PointCloud, SilentObserver
 from cylx.synthetic import single
@@ -58,6 +58,8 @@ def test_options_are_those_of_the_command(asked, tmp_path):
     options |= {"axis": "y", "axis_tolerance_deg": 5.0, "axis_sd_deg": 0.5, "min_coverage_deg": 60}
     options |= {"known_radius": (1.5, 0.01)}
     cylx.extract([[0, 0, 0]], config=tmp_path / "my.yaml", threads=2, **options)
+    cylx.extract([[0, 0, 0]], catalogue=[{"name": "DN50", "radius": 0.03}, 0.05])
+    assert asked[1][1].scene.catalogue == [CatalogueEntry(name="DN50", radius=0.03), CatalogueEntry(radius=0.05)]
     expected = load_config(
         preset="paper",
         overrides=["slicing.thickness=1", "slicing.min_points=9"],

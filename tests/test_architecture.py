@@ -9,9 +9,9 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "baselines", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence", "experiments", "game",
-    "geometry", "io", "measures", "noise", "open3d_door", "payoff", "pipeline", "records", "rejections", "results",
-    "scene", "stages", "synthetic",
+    "api", "baselines", "catalogue", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence",
+    "experiments", "game", "geometry", "io", "measures", "noise", "open3d_door", "payoff", "pipeline", "records",
+    "rejections", "results", "scene", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},
@@ -22,35 +22,30 @@ MAY_IMPORT = {
     "experiments": {"config", "cylx", "errors", "geometry", "open3d_door", "pipeline", "records", "synthetic"},
     "measures": {"geometry", "records"},
     "pipeline": {
-        "baselines",
-        "config",
-        "consensus",
-        "errors",
-        "game",
-        "geometry",
-        "measures",
-        "records",
-        "scene",
+        "baselines", "catalogue", "config", "consensus", "errors", "game", "geometry", "measures", "records", "scene",
         "stages",
     },
     "baselines": {"config", "errors", "geometry", "measures", "open3d_door", "records"},
-    "stages": {"config", "consensus", "errors", "evidence", "game", "geometry", "measures", "payoff", "records"},
+    "stages": {
+        "catalogue", "config", "consensus", "errors", "evidence", "game", "geometry", "measures", "payoff", "records",
+    },
     "noise": {"geometry"},
     "payoff": {"game", "geometry"},
-    "scene": {"config", "errors", "geometry", "noise", "records"},
+    "scene": {"catalogue", "config", "errors", "geometry", "noise", "records"},
     "results": {"config", "cylx", "errors", "geometry", "records"},
     "rejections": {"cylx", "records", "results"},
     "io": {"errors", "geometry", "open3d_door", "records"},
     "open3d_door": set(),
-    "records": {"config", "geometry"},
+    "records": {"catalogue", "config", "geometry"},
     "config": {"errors"},
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors"},
+    "catalogue": set(),
     "evidence": set(),
     "geometry": set(),
     "game": set(),
     "errors": set(),
-}
+}  # fmt: skip
 OWN_SECTION = {
     "curvature": "CandidatesConfig",
     "local_slices": "SlicingConfig",

@@ -50,7 +50,7 @@ def test_cylinders_are_found_written_and_judged(run_cylx, room, scan):
     assert (done.exit_code, done.stdout) == (0, "")
     content = json.loads(scan.with_suffix(".cylinders.json").read_bytes())
     jsonschema.validate(content, result_schema())
-    unknown = {"axis", "axis_sd_deg", "known_radius", "known_radius_sd"}
+    unknown = {"axis", "axis_sd_deg", "known_radius", "known_radius_sd", "catalogue"}
     assert {key for key, value in content["config"]["scene"].items() if value is None} == unknown
     vertices = PlyData.read(scan.with_suffix(".annotated.ply"))["vertex"]
     assert len(vertices) == 20000

@@ -287,7 +287,10 @@ def test_what_is_known_reaches_the_pipeline(run_cylx, scan, fake_pipeline):
     options += ["--known-radius", "0.5:0.01"]
     assert run_cylx("extract", scan, *options).exit_code == 0
     assert run_cylx("extract", scan, "--axis", "y", "--known-radius", "0.5", "-o", "-").exit_code == 0
-    (_, config, _), (_, other, _) = fake_pipeline.calls
+    scan.with_name("pipes.csv").write_text("radius,name\n0.5,DN\n")
+    assert run_cylx("extract", scan, "--catalogue", scan.with_name("pipes.csv"), "-o", "-").exit_code == 0
+    (_, config, _), (_, other, _), (_, listed, _) = fake_pipeline.calls
+    assert [(entry.name, entry.radius) for entry in listed.scene.catalogue] == [("DN", 0.5)]
     assert (config.scene.axis, config.scene.axis_tolerance_deg) == ([0, -2, 1], 5)
     assert config.verification.min_coverage_deg == 60
     assert (config.scene.axis_sd_deg, config.scene.known_radius, config.scene.known_radius_sd) == (0.5, 0.5, 0.01)

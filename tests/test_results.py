@@ -1,6 +1,7 @@
 """The JSON of a result: keys and their order, units, what is left out, what is refused."""
 
 import json
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -12,7 +13,7 @@ from cylx import __version__
 from cylx.config import Config
 from cylx.errors import InputError
 from cylx.geometry.cylinder import Cylinder
-from cylx.records import CylinderFit, Extraction, PointCloud, Scene, Source, StageReport
+from cylx.records import CylinderFit, Extraction, NominalRadius, PointCloud, Scene, Source, StageReport
 from cylx.results import Result, ResultCylinder, result_schema
 
 KEYS = ["schema", "cylx_version", "input", "method", "config", "scene", "stages", "cylinders", "warnings"]
@@ -39,6 +40,16 @@ fits = st.builds(
     payoff=st.floats(0, 1).map(np.float32),
     evidence=st.dictionaries(st.text(min_size=1), st.floats(), max_size=3),
 )
+matches = st.builds(
+    NominalRadius,
+    decision=st.sampled_from(["snapped", "ambiguous", "none"]),
+    name=st.none() | st.text(min_size=1),
+    nominal_radius=positive,
+    likelihood_ratio=st.floats(1e-9, 1e9),
+    free_radius=positive,
+    free_radius_sd=st.just(0.0) | positive,
+)
+listed_fits = st.builds(replace, fits, nominal=matches)
 
 
 @st.composite
@@ -47,7 +58,7 @@ def extractions(draw):
     points = np.array(draw(st.lists(st.tuples(finite, finite, finite), min_size=1, max_size=4)))
     source = Source(draw(st.text(min_size=1).filter(lambda name: "/" not in name)), "ply", "0" * 64)
     return Extraction(
-        cylinders=tuple(draw(st.lists(fits, max_size=3))),
+        cylinders=tuple(draw(st.lists(fits | listed_fits, max_size=3))),
         labels=np.full(len(points), -1, np.int32),
         residuals=np.full(len(points), np.nan, np.float32),
         cloud=PointCloud(points, source=source),
@@ -81,7 +92,8 @@ def test_keys_come_in_the_order_of_the_contract(extraction):
     assert list(content) == KEYS
     assert list(content["input"]) == ["file", "format", "points", "sha256", "bounds"]
     for cylinder in content["cylinders"]:
-        assert [key for key in cylinder if key != "evidence"] == CYLINDER_KEYS
+        assert [key for key in cylinder if key not in {"evidence", "catalogue"}] == CYLINDER_KEYS
+        assert cylinder.get("catalogue", {}).get("name", "") is not None
 
 
 def test_the_numbers_are_those_of_the_extraction(make_extraction):

@@ -263,9 +263,8 @@ def test_what_is_known_of_the_scene_is_not_measured(framed):
 def test_every_null_becomes_a_length(framed):
     _, frame, scene = framed
     config = resolve(Config(), scene)
-    assert (
-        None not in config.scene.model_dump(exclude={"axis", "axis_sd_deg", "known_radius", "known_radius_sd"}).values()
-    )
+    unknown = {"axis", "axis_sd_deg", "known_radius", "known_radius_sd", "catalogue"}
+    assert None not in config.scene.model_dump(exclude=unknown).values()
     assert config.slicing.thickness > 0
     assert config.ellipses.tolerance > 0
     assert (config.scene.spacing, config.scene.noise) == (scene.spacing, scene.noise)

@@ -73,7 +73,10 @@ class Conversation:
             show_table(["stage", "considered", "kept", "rejected"], _stage_rows(extraction), err=True)
         if fits:
             shown = fits if self.verbose else fits[:_MOST_ROWS]
-            show_table(_CYLINDER_HEADER, [_cylinder_row(i, fit) for i, fit in enumerate(shown)], err=True)
+            header, rows = _CYLINDER_HEADER, [_cylinder_row(i, fit) for i, fit in enumerate(shown)]
+            if extraction.config.scene.catalogue:
+                header, rows = [*header, "nominal"], [[*row, _nominal(f)] for row, f in zip(rows, shown, strict=True)]
+            show_table(header, rows, err=True)
             if len(shown) < len(fits):
                 tell(f"… and {len(fits) - len(shown)} more; -v shows them all")
 
@@ -195,6 +198,14 @@ def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
         "-" if fit.confidence is None else f"{fit.confidence:.2f}",
         direction,
     ]
+
+
+def _nominal(fit: CylinderFit) -> str:
+    """Name the entry of the catalogue that a cylinder was drawn to, in doubt with a question mark."""
+    nominal = fit.nominal
+    if nominal is None or nominal.decision == "none":
+        return "-"
+    return (nominal.name or f"{nominal.nominal_radius:.5g}") + ("?" if nominal.decision == "ambiguous" else "")
 
 
 def _stage_rows(extraction: Extraction) -> list[list[str]]:

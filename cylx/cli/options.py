@@ -147,6 +147,7 @@ def configured(command: Command) -> Command:
         axis_tolerance_deg: float | None,
         axis_sd_deg: float | None,
         known_radius: Known | None,
+        catalogue: str | None,
         min_coverage_deg: float | None,
         **others: object,
     ) -> object:
@@ -163,6 +164,7 @@ def configured(command: Command) -> Command:
             axis_tolerance_deg=axis_tolerance_deg,
             axis_sd_deg=axis_sd_deg,
             known_radius=known_radius,
+            catalogue=catalogue,
             min_coverage_deg=min_coverage_deg,
         )
         settings = load_config(path=config, preset=preset, overrides=overrides, options=options)
@@ -220,6 +222,12 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
         "--known-radius",
         type=KnownRadius(),
         help="Draw the radii to this one, known with a standard deviation SD.  [default: SD a thousandth]",
+    ),
+    click.option(
+        "--catalogue",
+        metavar="FILE",
+        shell_complete=complete_files,
+        help="Draw each radius to the one in this CSV or YAML file of nominal radii that the points bear out.",
     ),
     click.option(
         "--min-coverage",

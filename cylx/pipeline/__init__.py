@@ -19,7 +19,7 @@ from cylx.pipeline.sources import (
 from cylx.pipeline.turns import Turns
 from cylx.pipeline.warmup import kernels_are_cold, practice_cloud, second_process
 from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
-from cylx.scene import check_usable, known_of, make_frame, radius_range, resolve
+from cylx.scene import catalogue_of, check_usable, known_of, make_frame, radius_range, resolve
 from cylx.stages.clustering import CandidateGame, thin_candidates
 
 __all__ = ["extract_cylinders"]
@@ -77,7 +77,8 @@ def extract_cylinders(
         players = thin_candidates(players) if config.clustering.population == "local" else players
         witnesses = Candidates.joined([windows, local]) if len(windows) else candidates
         game = CandidateGame(players, config.clustering, threads)
-        turns = Turns(game, players, witnesses, ground, radii, known_of(config, frame), config, threads)
+        known, catalogue = known_of(config, frame), catalogue_of(config, frame)
+        turns = Turns(game, players, witnesses, ground, radii, known, catalogue, config, threads)
     with journal.stage("averaging"):
         findings = turns.play(journal)
     with journal.stage("merging"):

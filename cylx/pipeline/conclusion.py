@@ -14,13 +14,14 @@ from cylx.records import (
     Finding,
     Frame,
     Ground,
+    NominalRadius,
     PointCloud,
     Refusal,
     Rejection,
     Scene,
     StageReport,
 )
-from cylx.stages.averaging import STRUCTURED
+from cylx.stages.averaging import inflation
 from cylx.stages.labelling import label_points, surface_points
 
 
@@ -71,6 +72,7 @@ def conclude(
             findings[i].confidence if verified else None,
             findings[i].measures,
             _covariance(findings[i], frame.spacing),
+            _nominal(findings[i], config, frame.spacing),
         )
         for i in order
     ]
@@ -79,24 +81,30 @@ def conclude(
     in_cloud = np.empty(len(labels), np.int32), np.empty(len(labels), np.float32)
     in_cloud[0][frame.order] = number[labels]
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
-    warnings = (*_warnings(scene, fits), *_contradicted(config, fits))
+    warnings = (*_warnings(scene, fits), *_contradicted(config, fits), *_unlisted(config, fits))
     lost = [Refusal.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
     rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified, game=game))
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
 
 
 def _covariance(finding: Finding, spacing: float) -> NDArray[np.float64] | None:
-    """Put the covariance of a finding into scene units.
-
-    Where the residuals are structured beyond noise, because the object is no perfect cylinder or its noise is shared by
-    neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
-    """
+    """Put the covariance of a finding into scene units, inflated as its residuals ask for."""
     covariance = finding.segment.covariance
     if covariance is None:
         return None
-    lack = finding.measures.get("lack_of_fit", 1.0)
     units = np.array([spacing, spacing, 1.0, 1.0, spacing])
-    return np.asarray(covariance * np.outer(units, units) * (lack if lack > STRUCTURED else 1.0))
+    return np.asarray(covariance * np.outer(units, units) * inflation(finding.measures))
+
+
+def _nominal(finding: Finding, config: Config, spacing: float) -> NominalRadius | None:
+    """Name the entry of the catalogue that was chosen for a finding, and why; None if none was asked for."""
+    choice = finding.segment.choice
+    if choice is None or not config.scene.catalogue:
+        return None
+    entry = config.scene.catalogue[choice.entry]
+    return NominalRadius(
+        choice.decision, entry.name, entry.radius, choice.ratio, choice.radius * spacing, choice.deviation * spacing
+    )
 
 
 def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verified: bool, game: bool) -> list[Rejection]:
@@ -134,6 +142,15 @@ def _contradicted(config: Config, fits: list[CylinderFit]) -> list[str]:
         f"no cylinder has the known radius of {radius:.5g}; the nearest has {nearest:.5g}, "
         "and all are as they are without it"
     ]
+
+
+def _unlisted(config: Config, fits: list[CylinderFit]) -> list[str]:
+    """Say so if a catalogue was of no use to what was found."""
+    if not (config.scene.catalogue and fits):
+        return []
+    if any(fit.nominal is not None and fit.nominal.decision == "snapped" for fit in fits):
+        return []
+    return ["no radius was snapped to the catalogue: all are as they are without it; is it in the unit of the scan?"]
 
 
 def _warnings(scene: Scene, fits: list[CylinderFit]) -> list[str]:

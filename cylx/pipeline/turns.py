@@ -11,13 +11,14 @@ from itertools import repeat
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.catalogue import Catalogue
 from cylx.config import Config
 from cylx.consensus import Neighbourhood, is_contradicted
 from cylx.geometry.mixture_fit import Prior
 from cylx.pipeline.journal import Journal
 from cylx.pipeline.limits import out_of_range
 from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
-from cylx.stages.averaging import STRUCTURED, average_cluster, finish, measure_extent, refine, refit
+from cylx.stages.averaging import average_cluster, finish, inflation, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
@@ -48,6 +49,8 @@ class Turns:
         Least and greatest radius, frame units; they hold for the fitted cylinders, too.
     known : Prior or None
         What is known of each cylinder.
+    catalogue : Catalogue or None
+        Nominal radii, frame units.
     config : Config
         Resolved.
     threads : int
@@ -67,6 +70,7 @@ class Turns:
         ground: Ground,
         radii: tuple[float, float],
         known: Prior | None,
+        catalogue: Catalogue | None,
         config: Config,
         threads: int,
     ) -> None:
@@ -76,6 +80,7 @@ class Turns:
         self._ground = ground
         self._radii = radii
         self._known = known
+        self._catalogue = catalogue
         self._config = config
         self._threads = threads
         self.refused: list[Refusal] = []
@@ -171,8 +176,8 @@ class Turns:
 
     def _finish(self, finding: Finding) -> Finding:
         """Fit a finding to all its points; up to here a sample of them was enough."""
-        structured = finding.measures.get("lack_of_fit", 1.0) > STRUCTURED
-        fitted = finish(finding.segment, self._ground, self._known, structured=structured)
+        inflated = inflation(finding.measures)
+        fitted = finish(finding.segment, self._ground, self._known, self._catalogue, inflated=inflated)
         return finding if isinstance(fitted, str) else replace(finding, segment=fitted)
 
     def _enough(self, findings: list[Finding]) -> bool:

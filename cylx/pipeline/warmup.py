@@ -82,7 +82,7 @@ def practise_the_end() -> None:
     ground = Ground(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
     players = _practice_candidates(frame)
     game = CandidateGame(players, config.clustering, 1)
-    turns = Turns(game, players, players, ground, radii, None, config, 1)
+    turns = Turns(game, players, players, ground, radii, None, None, config, 1)
     findings = turns.merge(turns.play(journal), journal)
     conclude(cloud, frame, scene, ground, findings, turns.refused, journal.reports, config)
     candidates_of_windows(frame, explained, radii, config, 1, journal)

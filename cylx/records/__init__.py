@@ -7,7 +7,7 @@ one. All records are frozen: a stage makes new ones and never changes those it w
 from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source, cell_keys
 from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
 from cylx.records.octaves import CELL, Explained, Octave
-from cylx.records.outcomes import CylinderFit, Extraction, Finding, Refusal, Rejection, Segment
+from cylx.records.outcomes import CylinderFit, Extraction, Finding, NominalRadius, Refusal, Rejection, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "Frame",
     "Ground",
     "Noise",
+    "NominalRadius",
     "Observer",
     "Octave",
     "PointCloud",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.catalogue import Choice, Decision
 from cylx.geometry.cylinder import Cylinder
 from cylx.records.clouds import PointCloud, Scene
 from cylx.records.progress import StageReport
@@ -35,12 +36,15 @@ class Segment:
     covariance : ndarray of shape (5, 5), optional
         Of two offsets of the axis, its two tilts and the radius, in the frame of `fill_frame`; None before the last
         fit.
+    choice : Choice, optional
+        The entry of a catalogue that was chosen for the radius; None before the last fit, and without a catalogue.
     """
 
     model: FloatArray
     half: float
     spread: float
     covariance: FloatArray | None = None
+    choice: Choice | None = None
 
     @property
     def cylinder(self) -> Cylinder:
@@ -120,6 +124,32 @@ class Refusal:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class NominalRadius:
+    """The most likely entry of a catalogue for a cylinder.
+
+    Parameters
+    ----------
+    decision : {'snapped', 'ambiguous', 'none'}
+        `snapped` if the cylinder was fitted again with it (see `cylx.catalogue.Choice`).
+    name : str or None
+        Of the entry, if it has one.
+    nominal_radius : float
+        Of the entry, scene units.
+    likelihood_ratio : float
+        Of the entry to the stronger one of its two rivals: the second entry, and none at all; > 0.
+    free_radius, free_radius_sd : float
+        The fit without the catalogue, with its standard deviation, scene units.
+    """
+
+    decision: Decision
+    name: str | None
+    nominal_radius: float
+    likelihood_ratio: float
+    free_radius: float
+    free_radius_sd: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CylinderFit:
     """A cylinder and the evidence for it.
 
@@ -144,6 +174,8 @@ class CylinderFit:
     covariance : ndarray of shape (5, 5) or None
         Of two offsets of the axis at its point, along the two directions of `cylx.geometry.cylinder.axis_frame`, of
         two tilts of the axis towards them, and of the radius; scene units and radians. None if it was not computed.
+    nominal : NominalRadius or None
+        What the catalogue has for it; None without a catalogue or a covariance.
     """
 
     cylinder: Cylinder
@@ -155,6 +187,7 @@ class CylinderFit:
     confidence: float | None = None
     evidence: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = None
+    nominal: NominalRadius | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

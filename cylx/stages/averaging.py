@@ -8,12 +8,15 @@ accuracy of a fit to the segmented cylinder.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.catalogue import Catalogue, choose_entry
 from cylx.config import AveragingConfig
+from cylx.geometry.conditioning import given_radius
 from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
@@ -153,44 +156,90 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     return Segment(model, segment.half, spread)
 
 
-def finish(segment: Segment, ground: Ground, known: Prior | None = None, *, structured: bool = False) -> Segment | str:
+def inflation(measures: Mapping[str, float]) -> float:
+    """Tell how many times larger a covariance is than noise makes it, from what the verification measured.
+
+    Where the residuals are structured beyond noise, because the object is no perfect cylinder or its noise is shared by
+    neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
+    """
+    lack = measures.get("lack_of_fit", 1.0)
+    return lack if lack > STRUCTURED else 1.0
+
+
+def finish(
+    segment: Segment,
+    ground: Ground,
+    known: Prior | None = None,
+    catalogue: Catalogue | None = None,
+    *,
+    inflated: float = 1.0,
+) -> Segment | str:
     """Fit a cylinder to all its points by maximum likelihood, and say how uncertain it is.
 
     What is known draws the fit to it, as far as the points do not contradict it: a prior that is wrong by many
-    standard deviations would spoil the fit.
+    standard deviations would spoil the fit. A nominal radius draws the fit only where the points bear it out.
 
     Parameters
     ----------
     segment : Segment
     ground : Ground
     known : Prior, optional
-    structured : bool
-        Whether the object is no perfect cylinder, so that its residuals are no noise. The likelihood would be that of
-        its most cylindrical part; the robust fit is drawn by all of it, and stays.
+    catalogue : Catalogue, optional
+        Nominal radii, in the unit of the cloud's frame.
+    inflated : float
+        `inflation` of its covariance. If it is above 1, the object is no perfect cylinder, and its residuals are no
+        noise. The likelihood would be that of its most cylindrical part; the robust fit is drawn by all of it, and
+        stays.
 
     Returns
     -------
     Segment or str
-        With its covariance; that of `refit` without one if the points are too few for it; or why there is none.
+        With its covariance, not inflated; that of `refit` without one if the points are too few for it; or why there
+        is none.
     """
     points, width = _shell(segment, ground, None)
     fit = _robust_fit(points, width, segment, ground, steps=15, tolerance=ROUGH)
     if fit is None:
         return "no fit"
     model, spread = fit
-    model[3:6] *= np.sign(model[3 + int(np.abs(model[3:6]).argmax())])  # as the result has it
+    _turn_as_given(model)
     end, deviation = BEYOND * segment.half, max(spread, 1e-9 * model[6])  # points may lie on the surface exactly
     limits = {"low": -end, "high": end, "width": min(SURE * deviation, 2.0 * width), "deviation": deviation}
     likely = fit_mixture(points, model, **limits)
     if likely is None:
         return refit(segment, ground)
     prior = None if known is None else known.as_far_as_borne_out(likely)
-    if structured and prior is None:
+    robust = inflated > 1.0 and prior is None
+    if robust:
         fitted = refit(segment, ground)
-        return fitted if isinstance(fitted, str) else replace(fitted, covariance=likely.covariance)
-    if prior is not None:
-        likely = fit_mixture(points, model, **limits, prior=prior) or likely
-    return Segment(likely.model, segment.half, spread, likely.covariance)
+        if isinstance(fitted, str):
+            return fitted
+        free = replace(fitted, covariance=likely.covariance)
+    else:
+        if prior is not None:
+            likely = fit_mixture(points, model, **limits, prior=prior) or likely
+        free = Segment(likely.model, segment.half, spread, likely.covariance)
+    if catalogue is None:
+        return free
+    choice = choose_entry(float(free.model[6]), math.sqrt(inflated * likely.covariance[4, 4]), catalogue)
+    if choice.decision != "snapped":
+        return replace(free, choice=choice)
+    nominal = catalogue.radii[choice.entry]
+    # inflated with the rest, it is the tolerance again, and the points weigh as little as they should
+    tolerance = catalogue.tolerances[choice.entry] / math.sqrt(inflated)
+    snapping = (prior or Prior())._replace(radius=nominal, radius_deviation=tolerance)
+    snapped = None if robust else fit_mixture(points, model, **limits, prior=snapping)
+    if snapped is not None:
+        return Segment(snapped.model, segment.half, spread, snapped.covariance, choice)
+    start = free.model.copy()
+    _turn_as_given(start)
+    moved, covariance = given_radius(start, likely.covariance, nominal, tolerance)
+    return Segment(moved, segment.half, free.spread, covariance, choice)
+
+
+def _turn_as_given(model: FloatArray) -> None:
+    """Turn the direction of a model as the result has it, which the covariance goes by: its largest part positive."""
+    model[3:6] *= np.sign(model[3 + int(np.abs(model[3:6]).argmax())])
 
 
 def _shell(segment: Segment, ground: Ground, most: int | None) -> tuple[FloatArray, float]:

@@ -25,6 +25,7 @@ QUICK = {
     "single-auto": "single.py --preset auto --max-angle 0.05 --max-offset 0.002 --max-radius 0.1",
     "single-arc": "single.py --preset auto --theta 135 --sigma 0.005 --sigma-o 0.01 --p 0.1 --max-angle 0.05",
     "calibration": "calibration.py --trials 200 --max-ratio 1.3",
+    "catalogue": "catalogue.py --trials 40 --max-wrong 5",
     "recall-coverage": "recall.py --only coverage --trials 10",
     "recall-height": "recall.py --only height --trials 10",
     "recall-points": "recall.py --only points --trials 10",

@@ -1,0 +1,45 @@
+"""What the knowledge of a radius says of the rest of a cylinder that was fitted without it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.geometry.small_matrices import fill_frame
+
+FloatArray = NDArray[np.float64]
+
+
+def given_radius(
+    model: FloatArray, covariance: FloatArray, radius: float, deviation: float
+) -> tuple[FloatArray, FloatArray]:
+    """Condition a fitted cylinder on its radius: the mean and covariance of a Gaussian, given one more observation.
+
+    With the covariance C and c its last column, the parameters move by c (R - r) / (C_rr + t^2), and c c^T over the
+    same goes off the covariance.
+
+    Parameters
+    ----------
+    model : ndarray of shape (7,)
+        A point of the axis, its unit direction, the radius r. Not changed.
+    covariance : ndarray of shape (5, 5)
+        C, as `cylx.geometry.mixture_fit.MixtureFit` has it.
+    radius : float
+        R, the unit of the model.
+    deviation : float
+        t, its standard deviation, > 0.
+
+    Returns
+    -------
+    model, covariance : ndarray of shape (7,), (5, 5)
+    """
+    gain = covariance[:, 4] / (covariance[4, 4] + deviation**2)
+    step = gain * (radius - model[6])
+    frame = np.empty((2, 3))
+    fill_frame(model[3:6], frame)
+    moved = model.copy()
+    moved[:3] += step[:2] @ frame
+    moved[3:6] += step[2:4] @ frame
+    moved[3:6] /= np.linalg.norm(moved[3:6])
+    moved[6] += step[4]
+    return moved, covariance - np.outer(gain, covariance[4])
