@@ -12,7 +12,7 @@ from docs_tables import PACKAGE, TABLES, commands, config_keys, config_sections,
 from cylx import errors, evidence
 from cylx.config import Config
 from cylx.io import annotated
-from cylx.pipeline import sources, turns
+from cylx.pipeline import limits, sources, turns
 from cylx.records import Scene
 from cylx.scene import resolve
 from cylx.stages import averaging, clustering, curvature, local_slices, verification
@@ -106,7 +106,7 @@ FILES = [
     pytest.param(command, param, id=f"{path} {param.name}")
     for path, command in commands()
     for param in command.params
-    if isinstance(param, click.Argument) or param.metavar == "FILE"
+    if (isinstance(param, click.Argument) and not isinstance(param.type, click.Choice)) or param.metavar == "FILE"
 ]
 
 
@@ -198,7 +198,8 @@ def test_every_reason_of_a_rejection_is_told_of():
     told = part(read("docs/json-format.md"), "## The rejected")
     reasons = {term.reason for term in evidence.TERMS}
     reasons |= set(re.findall(r'"([a-z _]+)": ', inspect.getsource(verification._refusal)))
-    for module, found in ((averaging, r'return "([a-z ]+)"'), (turns, r'"([a-z_ ]+ (?:range|one|max_cylinders))"')):
+    ours = r'"([a-z_ ]+ (?:range|one|max_cylinders))"'
+    for module, found in ((averaging, r'return "([a-z ]+)"'), (turns, ours), (limits, ours)):
         reasons |= set(re.findall(found, inspect.getsource(module)))
     assert {"agreement", "bulge", "drifted away", "axis out of range", "beyond max_cylinders"} <= reasons
     assert [reason for reason in sorted(reasons) if f"`{reason}`" not in told] == []

@@ -63,9 +63,9 @@ def reproduce(
     data: str | None,
     talk: Conversation,
 ) -> None:
-    """Run the paper's experiments again: its figures 5 to 12, or all.
+    """Run the paper's experiments again.
 
-    For each figure this writes figure-N.csv, a line a trial, and figure-N.png, and a table of means goes to standard
+    FIGURE is a number from 5 to 12, or all. For each this writes figure-N.csv, a line a trial, and figure-N.png, and a table of means goes to standard
     output. What is interrupted goes on where it was. Times are those of this machine, of one thread in each of --jobs
     processes.
     """
