@@ -65,9 +65,9 @@ def reproduce(
 ) -> None:
     """Run the paper's experiments again.
 
-    FIGURE is a number from 5 to 12, or all. For each this writes figure-N.csv, a line a trial, and figure-N.png, and a table of means goes to standard
-    output. What is interrupted goes on where it was. Times are those of this machine, of one thread in each of --jobs
-    processes.
+    FIGURE is a number from 5 to 12, or all. For each this writes figure-N.csv, a line a trial, and figure-N.png, and
+    a table of means goes to standard output. What is interrupted goes on where it was. Times are those of this machine,
+    of one thread in each of --jobs processes.
     """
     from cylx.experiments import FIGURES
     from cylx.io import read_object

@@ -97,25 +97,13 @@ def _curves(axes: Axes, here: list[Summary], quantity: str, _trials: Trials) -> 
         if levels.count(curve) == 1 and len(here) > len(curves):
             axes.axhline(own[0].means[index], label=curve, linestyle="--", linewidth=1.2, **style)
             continue
-        x, y, error = ([value(summary) for summary in own] for value in _coordinates(index))
-        axes.errorbar(x, y, yerror_of(error), label=curve, marker="o", markersize=3, linewidth=1.3, capsize=2, **style)
+        x, y = [summary.cell.x for summary in own], [summary.means[index] for summary in own]
+        bars = [np.nan_to_num(summary.errors[index]) for summary in own]  # a single trial has none
+        axes.errorbar(x, y, bars, label=curve, marker="o", markersize=3, linewidth=1.3, capsize=2, **style)
     bounds = {summary.cell.x: summary.bound[index] for summary in here if summary.bound}
     if len({curve.partition(" ")[2] for curve in curves}) == 1 and len(bounds) > 1:
         places = sorted(bounds)
         axes.plot(places, [bounds[x] for x in places], color="grey", linestyle=":", label="bound")
-
-
-def _coordinates(index: int) -> tuple[Any, Any, Any]:
-    return (
-        lambda summary: summary.cell.x,
-        lambda summary: summary.means[index],
-        lambda summary: summary.errors[index],
-    )
-
-
-def yerror_of(errors: list[float]) -> list[float]:
-    """Give the lengths of error bars; none where there was one trial."""
-    return [error if np.isfinite(error) else 0.0 for error in errors]
 
 
 def _style(summary: Summary, family: list[str]) -> dict[str, Any]:

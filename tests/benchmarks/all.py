@@ -38,6 +38,7 @@ QUICK = {
     "tables": "scenes.py scenes/table?.ply scenes/view?.ply",
     "clutter": "scenes.py scenes/clutter100k_?.ply scenes/clutter300k_?.ply scenes/clutter1M_?.ply",
     "rack": "scenes.py scenes/rack1M_?.ply",
+    "oracle": "oracle.py scenes/clutter1M_?.ply scenes/rack1M_?.ply --max-ratio 1.5",
     "invariance": "invariance.py scenes/clutter300k_0.ply scenes/view0.ply --max-offset 0.001",
     "peers-clutter": "peers.py scenes/clutter300k_0.ply scenes/clutter1M_0.ply --rounds 2",
     "peers-rack": "peers.py scenes/rack1M_0.ply --max-ratio 0.5",
