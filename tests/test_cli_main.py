@@ -90,6 +90,18 @@ def test_help_imports_nothing_heavy(spawn_cylx, args):
     assert loaded & HEAVY == set()
 
 
+def test_extracting_imports_only_what_it_needs(spawn_cylx, scan, tmp_path):
+    prelude = (
+        "import atexit, sys, cylx.pipeline as pipeline; pipeline.kernels_are_cold = lambda: False;"
+        "atexit.register(lambda: print(*sys.modules, file=sys.stderr))"
+    )
+    shown = spawn_cylx("extract", scan, "-o", tmp_path / "found.json", "--quiet", prelude=prelude)
+    assert shown.returncode == 0
+    loaded = set(shown.stderr.decode().split())
+    assert "numba" in loaded
+    assert loaded & {"cylx.baselines", "cylx.experiments", "matplotlib", "open3d", "scipy.spatial"} == set()
+
+
 def test_importing_cylx_imports_nothing_heavy():
     code = "import cylx, sys; print(*sys.modules)"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True, text=True)

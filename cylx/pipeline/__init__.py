@@ -6,7 +6,6 @@ import os
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
-from cylx.pipeline.competitors import extract_by_competitor
 from cylx.pipeline.conclusion import conclude
 from cylx.pipeline.journal import Journal
 from cylx.pipeline.sources import (
@@ -58,6 +57,8 @@ def extract_cylinders(
         with journal.stage("compiling"), second_process():
             extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
     if config.method != "gt":
+        from cylx.pipeline.competitors import extract_by_competitor  # noqa: PLC0415  brings scipy.spatial: 0.3 s
+
         return extract_by_competitor(cloud, config, threads, journal)
     with journal.stage("scene"):
         frame, scene = make_frame(cloud.points, config)
