@@ -6,10 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx.config import Config
+from cylx.geometry.cylinder_fit import Kernel, fit_cylinder
 from cylx.geometry.morton import gather_ball
 from cylx.records import Octave
 from cylx.scene import make_frame
-from cylx.synthetic import multi
+from cylx.synthetic import multi, single
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=20, deadline=None)
@@ -27,6 +28,15 @@ def drawn(frame, seed, octave):
     return Octave.of(frame, frame.window * 1.6**octave, keep), keep, rng
 
 
+def full_voxels(frame, keep, side):
+    """Give the voxels that a surface more than touches: an eighth of the points of the fullest one in their block."""
+    voxels, counts = np.unique(np.floor(frame.points[keep] / side).astype(int), axis=0, return_counts=True)
+    fullest = {}
+    for voxel, count in zip(voxels >> 2, counts, strict=True):
+        fullest[tuple(voxel)] = max(count, fullest.get(tuple(voxel), 0))
+    return {tuple(v) for v, count in zip(voxels, counts, strict=True) if 8 * count >= fullest[tuple(v >> 2)]}
+
+
 def voxel_side(frame, radius):
     """Give the widest voxel that fits into the radius six times, in powers of two of the smallest window's."""
     side = frame.window / 6
@@ -42,9 +52,9 @@ def test_there_is_one_point_of_each_voxel(frame, seed, octave):
     side = voxel_side(frame, found.radius)
     assert np.isclose(frame.unit * 2**found.level, side)
     assert found.radius / 12 < side * (1 + 1e-9) <= found.radius / 6 * (1 + 2e-9)
-    voxels = np.floor(frame.points / side).astype(int)
-    own = voxels[found.indices]
-    assert len(np.unique(own, axis=0)) == len(own) == len(np.unique(voxels[keep], axis=0))
+    own = [tuple(voxel) for voxel in np.floor(frame.points[found.indices] / side).astype(int)]
+    assert len(set(own)) == len(own)
+    assert set(own) == full_voxels(frame, keep, side)
     assert keep[found.indices].all()
     assert np.array_equal(found.points, frame.points[found.indices])
     assert np.array_equal(found.codes, frame.codes[found.indices])
@@ -55,7 +65,10 @@ def test_there_is_one_point_of_each_voxel(frame, seed, octave):
 @given(seed=seeds, octave=st.integers(0, 6))
 def test_the_members_are_the_kept_points_each_in_the_voxel_of_its_own(frame, seed, octave):
     found, keep, _ = drawn(frame, seed, octave)
-    assert np.array_equal(found.members, np.flatnonzero(keep))
+    side = voxel_side(frame, found.radius)
+    full = full_voxels(frame, keep, side)
+    inside = [tuple(voxel) in full for voxel in np.floor(frame.points / side).astype(int)]
+    assert np.array_equal(found.members, np.flatnonzero(keep & inside))
     assert found.runs[0] == 0
     assert found.runs[-1] == len(found.members)
     assert (np.diff(found.runs) > 0).all()
@@ -118,3 +131,16 @@ def test_nothing_to_keep_is_an_empty_octave(frame):
     empty = Octave.of(frame, frame.window, np.zeros(len(frame.points), bool))
     assert len(empty.points) == len(empty.members) == len(empty.seeds(10)) == 0
     assert empty.runs.tolist() == [0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_thinning_does_not_bend_a_narrow_arc(seed):
+    scene = single(points=10000, sigma=0.005, theta_deg=30, seed=seed)
+    cloud = make_frame(scene.points, Config())[0]
+    octave = Octave.of(cloud, cloud.window_radii(1.6)[-1], np.ones(len(cloud.points), bool))
+    thinned = scene.points[cloud.order[octave.indices]]
+    assert len(thinned) < 600
+    wide = Kernel(1e3, 1e3, 1.0, np.inf)
+    fit = fit_cylinder(thinned, np.array([0, 0, 0, 0, 0, 1, 1.0]), low=-9, high=9, kernel=wide, steps=60)
+    sd = 26.8 * 0.005 / (np.sqrt(len(thinned)) * np.radians(30) ** 2)  # of the radius, at the bound for narrow arcs
+    assert abs(fit[0][6] - 1) < 3.5 * sd

@@ -16,6 +16,10 @@ IndexArray = NDArray[np.int64]
 MaskArray = NDArray[np.bool_]
 
 
+BLOCK = 2
+"""Levels from a voxel to the block of voxels that tells how many points one should have."""
+SLIVER = 8
+"""A voxel with so many times fewer points than the fullest one of its block is one that a surface hardly touches."""
 CELL = 4
 """Levels from a voxel to the cells that windows gather points from: to look a cell up takes as long as many points."""
 
@@ -59,7 +63,7 @@ class Octave:
     def of(cls, frame: Frame, radius: float, keep: MaskArray) -> Octave:
         """Thin the points to keep of a frame for windows of a radius."""
         level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window)))
-        members, voxels, runs = group(frame.codes, level, keep)
+        members, voxels, runs = _without_slivers(*group(frame.codes, level, keep))
         indices = members[pick_one(voxels, runs)]
         codes = frame.codes[indices]
         cells, starts = cell_starts(codes, level + CELL)
@@ -98,3 +102,18 @@ class Explained:
 
     flatness: FloatArray
     curved: MaskArray
+
+
+def _without_slivers(members: IndexArray, voxels: IndexArray, runs: IndexArray) -> tuple[IndexArray, ...]:
+    """Leave out the voxels that a surface hardly touches.
+
+    Where a surface runs along the faces of voxels, the few points that noise has moved across a face have voxels of
+    their own. With one point of each voxel they would have as great a say as all the others, and bend the surface.
+    """
+    counts, blocks = np.diff(runs), voxels >> (3 * BLOCK)
+    starts = np.flatnonzero(np.diff(blocks, prepend=-1))
+    fullest = np.repeat(np.maximum.reduceat(counts, starts), np.diff(starts, append=len(blocks)))
+    kept = SLIVER * counts >= fullest
+    if kept.all():
+        return members, voxels, runs
+    return members[np.repeat(kept, counts)], voxels[kept], np.concatenate([[0], np.cumsum(counts[kept])])
