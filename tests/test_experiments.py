@@ -398,8 +398,9 @@ def test_points_of_a_mesh_are_even_over_its_faces_within_the_noise(monkeypatch):
     assert np.array_equal(ObjectScan.of(CUBE, CUBE_FACES).points, scan.points)
 
 
-def test_points_without_faces_stay_as_they_are():
-    scan = ObjectScan.of(CUBE, None)
+@pytest.mark.parametrize("faces", [None, np.array([[0, 0, 0], [1, 2, 1]])], ids=["none", "without area"])
+def test_points_without_faces_stay_as_they_are(faces):
+    scan = ObjectScan.of(CUBE, faces)
     assert scan.points is CUBE
     assert (scan.extent, scan.center.tolist()) == (math.sqrt(14), [0.5, 1.0, 1.5])
 
