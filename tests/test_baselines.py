@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx import api, open3d_door
+from cylx.baselines import msac
 from cylx.baselines.jin import _search_sphere, _straight
 from cylx.baselines.line_fit import fit_line_of_centres
 from cylx.baselines.msac import _cylinder_through, _loss
@@ -176,6 +177,21 @@ def test_a_fit_to_its_inliers_makes_msac_exact(can):
         error < limit
         for error, limit in zip(errors(shapes_of(found)[0], can.cylinders[0].cylinder), (0.15, 4e-3, 2e-3), strict=True)
     )
+
+
+def test_msac_ends_with_a_cylinder_that_takes_no_point_away(monkeypatch, can):
+    best_of = msac._best_of
+
+    def too_large(*args):
+        model = best_of(*args)
+        model[6] *= 1.2
+        return model
+
+    monkeypatch.setattr(msac, "_best_of", too_large)
+    # all points are 0.2 from the surface: within the distance, and beyond the 5 % that are taken away
+    found = extract(can.points, method="msac", overrides=["msac.distance=0.4"])
+    (report,) = (stage for stage in found.stages if stage.name == "msac")
+    assert report.considered == 1
 
 
 # limits
