@@ -5,15 +5,19 @@ import os
 import sys
 
 import jsonschema
+import numpy as np
 import pytest
 from plyfile import PlyData
 
 import cylx.io
 from cylx.cli.display import Conversation
+from cylx.cli.options import METHODS
 from cylx.cli.outputs import plan_jobs
+from cylx.config import load_config
 from cylx.errors import InputError, OutputError, UsageError
 from cylx.rejections import rejections_schema
 from cylx.results import result_schema
+from cylx.synthetic import single
 
 pytestmark = pytest.mark.usefixtures("fake_pipeline")
 
@@ -406,6 +410,67 @@ def test_progress_is_shown_on_a_terminal_only(run_cylx, scan, monkeypatch):
     assert "compiling (the first time only)" in shown
     assert "1/2" in shown
     assert on_a_terminal(lambda: show_progress(Conversation(quiet=True))) == ""
+
+
+# methods
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_method_reaches_the_pipeline(run_cylx, scan, fake_pipeline, method):
+    assert run_cylx("extract", scan, "--method", method).exit_code == 0
+    (call,) = fake_pipeline.calls
+    assert call[1] == load_config(options={"method": method})
+    content = json.loads(scan.with_name("scan.cylinders.json").read_bytes())
+    assert content["method"] == content["config"]["method"] == method
+
+
+def test_a_competitor_answers_in_the_same_form(run_cylx, tmp_path, monkeypatch):
+    monkeypatch.undo()  # the pipeline itself is asked
+    scene = single(points=1500, sigma=0.01, seed=1)
+    np.savetxt(tmp_path / "can.xyz", scene.points)
+    done = run_cylx("extract", tmp_path / "can.xyz", "--method", "line-fit")
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert names(tmp_path) == ["can.annotated.ply", "can.cylinders.json", "can.xyz"]
+    content = json.loads((tmp_path / "can.cylinders.json").read_bytes())
+    jsonschema.validate(content, result_schema())
+    assert content["method"] == "line-fit"
+    (cylinder,) = content["cylinders"]
+    # a least-squares fit of 1500 points has 2e-4 of standard deviation
+    assert cylinder["radius"] == pytest.approx(1.0, abs=1e-3)
+    assert not {"payoff", "confidence", "uncertainty"} & set(cylinder)
+    ids = PlyData.read(tmp_path / "can.annotated.ply")["vertex"]["cylinder_id"]
+    assert (ids == 0).sum() == cylinder["inliers"] > 1400
+
+
+@pytest.mark.parametrize(
+    ("options", "fault"),
+    [
+        (["--method", "ransac"], "Invalid value for '--method': 'ransac' is not one of "),
+        (["--method", "GT"], "Invalid value for '--method': 'GT' is not one of "),
+        (
+            ["--method", "tran", "--known-radius", "1"],
+            "scene.known_radius: is for method gt alone, and the method is tran",
+        ),
+        (
+            ["--method", "jin", "--axis", "z", "--axis-sd", "1"],
+            "scene.axis_sd_deg: is for method gt alone, and the method is jin",
+        ),
+        (
+            ["--set", "method=7"],
+            "--set method: 7 is not one of its values; choose gt or msac or line-fit or tran or jin",
+        ),
+        (
+            ["--set", "slicing.inclination_deg=[0, 10]"],
+            "slicing.inclination_deg: is given without the axis it refers to",
+        ),
+    ],
+)
+def test_a_method_that_there_is_not_or_that_cannot_do_it_is_refused(run_cylx, scan, fake_pipeline, options, fault):
+    failed = run_cylx("extract", scan, *options)
+    (line,) = failed.stderr.splitlines()
+    assert (failed.exit_code, fake_pipeline.calls) == (2, [])
+    assert line.startswith(f"cylx: {fault}")
+    assert names(scan.parent) == ["scan.xyz"]
 
 
 def show_progress(talk):

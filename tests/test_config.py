@@ -168,7 +168,8 @@ REFUSED = [
     ("slicing.planes: 1", "my.yaml: slicing.planes: unknown key; write 'planes' below 'slicing:', indented"),
     (
         "slicing: {zzz: 1}",
-        "my.yaml: slicing.zzz: unknown key; the keys here are planes, local_planes, windows, thickness, min_points",
+        "my.yaml: slicing.zzz: unknown key; "
+        "the keys here are planes, inclination_deg, local_planes, windows, thickness, min_points",
     ),
     ("slicing: {planes: 2.5}", "my.yaml: slicing.planes: 2.5 is not an integer; write digits alone"),
     ("slicing: {planes: true}", "my.yaml: slicing.planes: true is not an integer; write digits alone"),
@@ -220,6 +221,36 @@ REFUSED = [
     ("scene: {axis_tolerance_deg: 0}", "my.yaml: scene.axis_tolerance_deg: 0 is out of range; it must be > 0"),
     ("scene: {axis_sd_deg: 1}", "scene.axis_sd_deg: is given without scene.axis; give that, too"),
     ("scene: {known_radius_sd: 1}", "scene.known_radius_sd: is given without scene.known_radius; give that, too"),
+    (
+        "scene: {axis: [0, 0, 1]}\nslicing: {inclination_deg: [50, 40]}",
+        "my.yaml: slicing: inclination_deg [50, 40] has its least angle above its greatest; swap them",
+    ),
+    (
+        "slicing: {inclination_deg: [40, 50]}",
+        "slicing.inclination_deg: is given without the axis it refers to; give scene.axis, too",
+    ),
+    (
+        "scene: {axis: [0, 0, 1]}\nslicing: {inclination_deg: [40, 91]}",
+        "my.yaml: slicing.inclination_deg.1: 91 is out of range; it must be <= 90",
+    ),
+    (
+        "scene: {axis: [0, 0, 1]}\nslicing: {inclination_deg: [40]}",
+        "my.yaml: slicing.inclination_deg: [40] is too short; it must have 2 or more entries",
+    ),
+    (
+        "method: msca",
+        "my.yaml: method: 'msca' is not one of its values; did you mean 'msac'?",
+    ),
+    (
+        "method: tran\nscene: {known_radius: 1}",
+        "scene.known_radius: is for method gt alone, and the method is tran; "
+        "leave it out, or give scene.radius_min and scene.radius_max",
+    ),
+    ("msac: {removal: 1}", "my.yaml: msac.removal: 1 is out of range; it must be < 1"),
+    ("tran: {normal_angle_deg: 90}", "my.yaml: tran.normal_angle_deg: 90 is out of range; it must be < 90"),
+    ("jin: {min_spheres: 2}", "my.yaml: jin.min_spheres: 2 is out of range; it must be >= 3"),
+    ("line_fit: {reach: 0}", "my.yaml: line_fit.reach: 0 is out of range; it must be > 0"),
+    ("line-fit: {reach: 0.5}", "my.yaml: line-fit: unknown key; did you mean 'line_fit'?"),
     ("scene: {known_radius: 0}", "my.yaml: scene.known_radius: 0 is out of range; it must be > 0"),
     ("scene: {axis_tolerance_deg: 91}", "my.yaml: scene.axis_tolerance_deg: 91 is out of range; it must be <= 90"),
     ("- a\n- b", "my.yaml: has no keys at its top level; write 'section:' and its keys below it"),

@@ -1,10 +1,11 @@
-"""The circle with the most support: the true one among strays, within the radii that are asked for."""
+"""The circle with the most support among strays, within the radii asked for; and the circle of least squares."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.geometry.circle import search_circle
+from cylx.geometry.circle import fit_circle, search_circle
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=40, deadline=None)
@@ -127,3 +128,104 @@ def test_points_on_a_line_and_single_points_have_no_circle():
         assert np.isnan(shape).all()
     assert search(line, np.full((5, 5), 3), 0.1)[0] == 0  # one point drawn again and again
     assert search(line, np.empty((0, 5), np.int64), 0.1)[0] == 0
+
+
+# least squares
+
+
+@laws
+@given(seeds, st.floats(0.3, 2 * np.pi), st.integers(3, 200), st.floats(-6, 6))
+def test_exact_circles_are_fitted_exactly(seed, arc, n, exponent):
+    rng = np.random.default_rng(seed)
+    radius = 10.0**exponent
+    center = 3 * radius * rng.standard_normal(2)
+    angles = rng.uniform(0, 2 * np.pi) + arc * np.linspace(0, 1, n, endpoint=False)
+    found, size = fit_circle(center + radius * np.column_stack([np.cos(angles), np.sin(angles)]))
+    # rounding of 1e-15 radii, over the height of the arc and once more in Taubin's moments
+    atol = 1e-9 * radius / min(arc * (1 - 1 / n), 2.0) ** 4
+    assert np.allclose(found, center, rtol=0, atol=atol)
+    assert abs(size - radius) < atol
+
+
+@laws
+@given(seeds, st.floats(1.0, 2 * np.pi), st.floats(-3, 3))
+def test_the_least_squares_circle_follows_motion_and_scale(seed, arc, exponent):
+    rng = np.random.default_rng(seed)
+    points = ring(rng, 100, [0, 0], 1.0, arc) + 0.02 * rng.standard_normal((100, 2))
+    scale, angle = 10.0**exponent, rng.uniform(0, 2 * np.pi)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    shift = 100 * scale * rng.standard_normal(2)
+    center, radius = fit_circle(points, steps=20)
+    moved_center, moved_radius = fit_circle(scale * points @ turn.T + shift, steps=20)
+    again_center, again_radius = fit_circle(rng.permutation(points), steps=20)
+    assert np.allclose(moved_center, scale * turn @ center + shift, rtol=0, atol=1e-6 * scale)
+    assert np.isclose(moved_radius, scale * radius, rtol=1e-6)
+    assert np.allclose([*again_center, again_radius], [*center, radius], rtol=0, atol=1e-9)
+
+
+@laws
+@given(seeds, st.floats(1.0, 2 * np.pi))
+def test_it_is_the_least_squares_of_the_distances(seed, arc):
+    """A step in any direction makes the sum of squared orthogonal distances greater."""
+    rng = np.random.default_rng(seed)
+    points = ring(rng, 80, [2, -1], 1.0, arc) + 0.03 * rng.standard_normal((80, 2))
+
+    def loss(x, y, r):
+        return ((np.hypot(points[:, 0] - x, points[:, 1] - y) - r) ** 2).sum()
+
+    center, radius = fit_circle(points, steps=20)
+    best = loss(*center, radius)
+    for step in 1e-3 * np.concatenate([np.eye(3), -np.eye(3)]):
+        assert loss(center[0] + step[0], center[1] + step[1], radius + step[2]) > best
+
+
+@pytest.mark.parametrize("arc_deg", [360, 180, 90])
+def test_its_errors_are_those_of_the_noise(arc_deg):
+    n, sigma, trials, arc = 200, 0.01, 200, np.radians(arc_deg)
+    rng = np.random.default_rng(arc_deg)
+    errors = []
+    for _ in range(trials):
+        points = ring(rng, n, [3, 4], 1.0, arc) + sigma * rng.standard_normal((n, 2))
+        center, radius = fit_circle(points)
+        errors.append([*center - [3, 4], radius - 1.0])
+    c1, c2 = np.sin(arc / 2) / (arc / 2), (1 + np.sin(arc) / arc) / 2
+    middle = np.array([np.cos(arc / 2), np.sin(arc / 2)])
+    along, across = np.array(errors)[:, :2] @ middle, np.array(errors)[:, :2] @ [-middle[1], middle[0]]
+    k = sigma**2 / n
+    expected = [k / (c2 - c1**2), k / (1 - c2), k * c2 / (c2 - c1**2)]
+    ratios = [
+        (values**2).mean() / one for values, one in zip((along, across, np.array(errors)[:, 2]), expected, strict=True)
+    ]
+    # chi-squared with as many degrees of freedom as trials; on the short arc second order adds a few percent
+    assert np.allclose(ratios, 1.0, rtol=0, atol=4 * np.sqrt(2 / trials) + 0.05)
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        np.empty((0, 2)),
+        np.ones((1, 2)),
+        np.eye(2),
+        np.ones((20, 2)),
+        np.column_stack([np.arange(20.0), np.zeros(20)]),
+        np.column_stack([np.zeros(20), np.arange(20.0)]),
+        np.column_stack([np.arange(20.0), np.arange(20.0)]),
+        np.repeat(np.eye(2), 10, axis=0),
+    ],
+    ids=["none", "one", "two", "one again and again", "level", "upright", "slanting", "two again and again"],
+)
+def test_what_is_no_circle_has_none(points):
+    assert fit_circle(points) is None
+
+
+@laws
+@given(seeds)
+def test_points_about_a_line_have_no_circle_or_a_large_one(seed):
+    rng = np.random.default_rng(seed)
+    direction, shift = rng.standard_normal((2, 2))
+    direction /= np.linalg.norm(direction)
+    along = np.sort(rng.uniform(-1, 1, 30))
+    points = shift + along[:, None] * direction + 1e-12 * rng.standard_normal((30, 2))
+    found = fit_circle(points)
+    # what is bent by 1e-12 over a length of 2 has a radius of 1 / 1e-12 or so
+    assert found is None or found[1] > 1e6

@@ -2,8 +2,11 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from cylx.config import Config, SlicingConfig
+from cylx.geometry.cylinder import axis_frame
 from cylx.geometry.plane import Plane
 from cylx.scene import make_frame
 from cylx.stages.slicing import cut_slice, draw_planes
@@ -50,3 +53,54 @@ def test_a_slice_holds_the_points_within_half_its_thickness(frame, thickness):
 def test_a_plane_beside_the_cloud_cuts_nothing(frame):
     beside = Plane(np.array([0.0, 0.0, 1e6]), np.array([0.0, 0.0, 1.0]))
     assert cut_slice(frame.points, beside, 1.0).points.shape == (0, 2)
+
+
+directions = st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda axis: np.linalg.norm(axis) > 1e-3)
+
+
+def angles_deg(planes, axis):
+    normals = np.array([plane.normal for plane in planes])
+    return np.degrees(np.arccos(np.minimum(np.abs(normals @ axis) / np.linalg.norm(axis), 1.0)))
+
+
+@settings(max_examples=30, deadline=None)
+@given(directions, st.floats(-6, 6), st.floats(0, 90), st.floats(0, 90), st.integers(0, 2**32 - 1))
+def test_planes_keep_the_inclination_to_any_axis(frame, axis, exponent, one, other, seed):
+    axis = list(10.0**exponent * np.array(axis))
+    low, high = sorted((one, other))
+    config = SlicingConfig(planes=50, inclination_deg=[low, high])
+    planes = draw_planes(frame, config, seed, axis)
+    found = angles_deg(planes, np.array(axis))
+    # an arc cosine of a number within 1e-16 of 1 is as far off as its square root
+    assert found.min() >= low - 1e-5
+    assert found.max() <= high + 1e-5
+    assert np.allclose([np.linalg.norm(plane.normal) for plane in planes], 1.0)
+    opposite = draw_planes(frame, config, seed, [-x for x in axis])
+    assert all(np.array_equal(a.normal, b.normal) for a, b in zip(planes, opposite, strict=True))
+
+
+@pytest.mark.parametrize(("low", "high"), [(0, 90), (20, 70), (80, 90), (45, 45)])
+def test_they_are_spread_evenly_over_that_part_of_the_sphere(frame, low, high):
+    axis, n = np.array([1.0, -2.0, 0.5]), 4000
+    axis /= np.linalg.norm(axis)
+    planes = draw_planes(frame, SlicingConfig(planes=n, inclination_deg=[low, high]), 7, list(axis))
+    normals = np.array([plane.normal for plane in planes])
+    normals *= np.where(normals @ axis < 0, -1.0, 1.0)[:, None]
+    # even over the area means even in the height, by Archimedes; and even about the axis
+    top, bottom = np.cos(np.radians([low, high]))
+    heights = normals @ axis
+    assert heights.mean() == pytest.approx((top + bottom) / 2, abs=4 * (top - bottom) / np.sqrt(12 * n) + 1e-9)
+    assert heights.std() == pytest.approx((top - bottom) / np.sqrt(12), abs=4 * (top - bottom) / np.sqrt(12 * n) + 1e-9)
+    first, second = axis_frame(axis)
+    turns = np.arctan2(normals @ second, normals @ first)
+    for k in (1, 2, 3):
+        assert abs(np.exp(1j * k * turns).mean()) < 4 / np.sqrt(n)
+
+
+def test_without_an_axis_or_an_inclination_all_planes_are_as_ever(frame):
+    anyhow = draw_planes(frame, SlicingConfig(planes=20), 1)
+    without_axis = draw_planes(frame, SlicingConfig(planes=20, inclination_deg=[10, 20]), 1)
+    with_axis_alone = draw_planes(frame, SlicingConfig(planes=20), 1, [0.0, 0.0, 1.0])
+    for others in (without_axis, with_axis_alone):
+        assert all(np.array_equal(a.normal, b.normal) for a, b in zip(anyhow, others, strict=True))
+        assert all(np.array_equal(a.point, b.point) for a, b in zip(anyhow, others, strict=True))

@@ -96,6 +96,8 @@ def find_by_consensus(
             _, distances, _ = cylinder_coordinates(points, model[:3], model[3:6])
         found.append(Proposal.spanning(model[:3], model[3:6], float(model[6]), points[inliers], 1))
         left = np.abs(distances - model[6]) > config.removal * model[6]
+        if left.all():  # the same would be found again and again
+            break
         points, normals = points[left], normals[left]
     return found
 

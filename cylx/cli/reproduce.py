@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.failures import tell
+from cylx.cli.failures import answer
 from cylx.cli.group import ExampleCommand
 from cylx.cli.options import complete_files, debug_option, talking
 from cylx.errors import OutputError, UsageError
@@ -75,14 +75,15 @@ def reproduce(
     numbers = sorted({int(name) for name in NUMBERS if name in figures or "all" in figures})
     chosen = [_only(FIGURES[number], curves) for number in numbers]
     if data is None and any(figure.needs_scan for figure in chosen):
-        needing = " and ".join(str(figure.number) for figure in chosen if figure.needs_scan)
-        raise UsageError("--data", f"figure {needing} needs the scan of a can", "give one by --data FILE")
-    study = Study(Path(out), trials, jobs or os.cpu_count() or 1, talk)
+        needing = [str(figure.number) for figure in chosen if figure.needs_scan]
+        which = f"figure {needing[0]} needs" if len(needing) == 1 else f"figures {' and '.join(needing)} need"
+        raise UsageError("--data", f"{which} the scan of a can", "give one by --data FILE")
     scan = None
     if data is not None:
         from cylx.experiments import ObjectScan
 
         scan = ObjectScan.of(*read_object(data))
+    study = Study(Path(out), trials, jobs or os.cpu_count() or 1, talk)
     for figure in chosen:
         study.run(figure, scan if figure.needs_scan else None)
 
@@ -210,5 +211,5 @@ def _show(figure: Figure, summaries: list[Summary]) -> None:
         rows.append(
             [cell.panel, cell.curve, f"{cell.x:g}", str(summary.trials), f"{summary.found:.2f}", *numbers, *over]
         )
-    tell(f"figure {figure.number}: {figure.title}" + (", mean ± standard error" if errors else ""))
+    answer(f"figure {figure.number}: {figure.title}" + (", mean ± standard error" if errors else "") + "\n")
     show_table(header, rows)

@@ -38,11 +38,11 @@ class ObjectScan:
     def of(cls, vertices: FloatArray, faces: FaceArray | None) -> ObjectScan:
         """Take points as they are; draw them from the faces of a mesh, evenly, with a little noise."""
         extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-        if faces is None:
+        a, b, c = (vertices[[] if faces is None else faces[:, k]] for k in range(3))
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        if faces is None or not areas.any():
             return cls(vertices, extent)
         rng = np.random.default_rng(0)
-        a, b, c = (vertices[faces[:, k]] for k in range(3))
-        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         face = rng.choice(len(faces), SCANNED, p=areas / areas.sum())
         u, v = rng.random((2, SCANNED, 1))
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)

@@ -51,8 +51,11 @@ def parse_trials(text: str) -> Trials | None:
     dict of Key to Outcome, or None
         None if it is no such file.
     """
-    rows = csv.reader(io.StringIO(text))
-    if tuple(next(rows, COLUMNS)) != COLUMNS:
+    try:
+        header, *rows = csv.reader(io.StringIO(text)) if text else [COLUMNS]
+    except csv.Error:
+        return None
+    if tuple(header) != COLUMNS:
         return None
     trials: Trials = {}
     for row in rows:

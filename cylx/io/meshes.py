@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from plyfile import PlyData, PlyParseError
+from plyfile import PlyData, PlyListProperty, PlyParseError
 
 from cylx.errors import InputError
 from cylx.io.clouds import read_cloud
@@ -40,14 +41,21 @@ def read_object(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64
     cloud = read_cloud(path)
     if cloud.source.format != "ply":
         return cloud.points, None
+    if not Path(path).is_file():
+        raise InputError(printable(path), "is no file, and a mesh is read twice", "save it to a file")
     try:
-        elements = PlyData.read(str(path))
-    except (PlyParseError, ValueError) as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of empty lists
+            elements = PlyData.read(str(path))
+    except (PlyParseError, ValueError, OverflowError, MemoryError) as error:
         raise InputError(printable(path), f"its faces cannot be read: {error}", "save the mesh again") from None
     faces = next((element for element in elements if element.name == "face" and element.count), None)
     name = next((name for name in _NAMES if faces is not None and name in faces), None)
     if faces is None or name is None:
         return cloud.points, None
+    kind = faces.ply_property(name)
+    if not isinstance(kind, PlyListProperty) or kind.val_dtype[0] not in "iu":
+        raise InputError(printable(path), f"the property {name} is no list of integers", "save the mesh again")
     rows = faces[name]
     if any(len(row) != 3 for row in rows):
         raise InputError(printable(path), "has faces that are no triangles", "triangulate the mesh")
