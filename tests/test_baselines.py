@@ -230,6 +230,17 @@ def test_one_out_of_the_limits_is_none(can, method):
     assert all(0.1 <= shape.radius <= 0.5 for shape in shapes_of(smaller))
 
 
+def test_what_is_refused_does_not_count():
+    rng = np.random.default_rng(0)
+    part = Mantle(Cylinder((0, 0, 0), (0, 0, 1), 1.0, 4.0), 0.0, np.radians(120)).sample(rng, 2500)
+    whole = Mantle(Cylinder((6, 0, 0), (0, 0.8, 0.6), 0.7, 4.0), 0.0, 2 * np.pi).sample(rng, 1000)
+    points = np.concatenate([part, whole]) + SIGMA * rng.standard_normal((3500, 3))
+    (first,) = extract(points, method="msac", max_cylinders=1).cylinders
+    assert first.cylinder.radius > 0.9
+    (found,) = extract(points, method="msac", max_cylinders=1, min_coverage_deg=200).cylinders
+    assert found.cylinder.radius < 0.8
+
+
 @pytest.mark.parametrize("method", SEVERAL)
 @pytest.mark.parametrize("most", [1, 2])
 def test_no_more_cylinders_than_asked_for(pair, method, most):

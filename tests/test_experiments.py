@@ -29,7 +29,6 @@ from cylx.experiments import (
     trials,
 )
 from cylx.experiments.figures import METHODS, Cell
-from cylx.experiments.pictures import yerror_of
 from cylx.experiments.scans import cans_among_clutter, two_cans
 from cylx.experiments.study import bound_of
 from cylx.experiments.trials import config_of
@@ -341,10 +340,6 @@ def test_every_kind_of_figure_is_drawn_however_much_of_it_is_there(number):
     assert len(set(pictures)) == len(pictures)
 
 
-def test_error_bars_of_one_trial_have_no_length():
-    assert yerror_of([0.5, NAN, 0.0]) == [0.5, 0.0, 0.0]
-
-
 def test_without_matplotlib_it_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
     with pytest.raises(UsageError) as refused:
@@ -464,3 +459,9 @@ def test_two_cans_are_found_in_a_trial():
     assert first.angle_deg < 3
     assert first[:2] == again[:2]
     assert np.isnan(first[2:4]).all()
+
+
+def test_trials_made_with_another_scan_are_not_taken_for_those_of_this_one():
+    text = header_line() + trial_lines(DONE.items(), "0.1.0 aaaaaaaa")
+    assert list(parse_trials(text, "0.1.0 aaaaaaaa")) == list(parse_trials(text, None)) == list(DONE)
+    assert parse_trials(text, "0.1.0 bbbbbbbb") == parse_trials(text) == {}

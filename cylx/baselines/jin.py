@@ -15,6 +15,7 @@ of pipes, which the original goes on to, are left out, as in the paper.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -46,10 +47,9 @@ def find_by_spheres(
     axis: tuple[FloatArray, float] | None,
     config: JinConfig,
     *,
-    most: int | None,
     seed: int,
     threads: int,
-) -> list[Proposal]:
+) -> Iterator[Proposal]:
     """Find cylinders as lines of spheres, the one with the most spheres first.
 
     Parameters
@@ -61,31 +61,27 @@ def find_by_spheres(
         Unit direction of the axes looked for, and the greatest angle to it, radians.
     config : JinConfig
         Resolved.
-    most : int or None
-        Most cylinders.
     seed : int
     threads : int
         Does not change the result.
 
-    Returns
-    -------
-    list of Proposal
+    Yields
+    ------
+    Proposal
     """
     spheres = _find_spheres(frame, radii, config, seed, threads)
     spheres = spheres[_straight(spheres, config.min_linearity)]
     rng = np.random.default_rng([seed, 13])
-    found: list[Proposal] = []
-    while len(spheres) >= config.min_spheres and (most is None or len(found) < most):
+    while len(spheres) >= config.min_spheres:
         pairs = rng.integers(len(spheres), size=(config.line_iterations, 2))
         member = _best_line(spheres, pairs, config.line_distance, axis)
         if int(member.sum()) < config.min_spheres:
-            break
+            return
         own = spheres[member]
         point = own[:, :3].mean(axis=0)
         direction = canonical_direction(np.linalg.svd(own[:, :3] - point)[2][0])
-        found.append(Proposal.spanning(point, direction, float(np.median(own[:, 3])), own[:, :3], len(own)))
+        yield Proposal.spanning(point, direction, float(np.median(own[:, 3])), own[:, :3], len(own))
         spheres = spheres[~member]
-    return found
 
 
 def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, seed: int, threads: int) -> FloatArray:

@@ -13,6 +13,7 @@ distance alone tells inliers, not the angle of the normals; the best sample is t
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -43,10 +44,9 @@ def find_by_consensus(
     axis: tuple[FloatArray, float] | None,
     config: MsacConfig,
     *,
-    most: int | None,
     seed: int,
     threads: int,
-) -> list[Proposal]:
+) -> Iterator[Proposal]:
     """Find cylinders by MSAC, the best supported one first.
 
     Parameters
@@ -58,15 +58,13 @@ def find_by_consensus(
         Unit direction of the axes looked for, and the greatest angle to it, radians.
     config : MsacConfig
         Resolved.
-    most : int or None
-        Most cylinders.
     seed : int
     threads : int
         Does not change the result.
 
-    Returns
-    -------
-    list of Proposal
+    Yields
+    ------
+    Proposal
 
     Raises
     ------
@@ -81,25 +79,23 @@ def find_by_consensus(
     distance = (config.distance or 0.0) / frame.spacing
     limits = np.array([*radii, *(axis[0] if axis else np.zeros(3)), math.cos(axis[1]) if axis else -1.0])
     least = max(6, math.ceil(config.min_share * len(points)))
-    found: list[Proposal] = []
-    while len(points) >= least and (most is None or len(found) < most):
+    while len(points) >= least:
         pairs = rng.integers(len(points), size=(config.iterations, 2))
         model = _best_of(points, normals, pairs, distance, limits, threads)
         if model is None:
-            break
+            return
         _, distances, _ = cylinder_coordinates(points, model[:3], model[3:6])
         inliers = np.abs(distances - model[6]) < distance
         if int(inliers.sum()) < least:
-            break
+            return
         if config.refine:
             model = _refined(points[inliers], model, distance)
             _, distances, _ = cylinder_coordinates(points, model[:3], model[3:6])
-        found.append(Proposal.spanning(model[:3], model[3:6], float(model[6]), points[inliers], 1))
+        yield Proposal.spanning(model[:3], model[3:6], float(model[6]), points[inliers], 1)
         left = np.abs(distances - model[6]) > config.removal * model[6]
         if left.all():  # the same would be found again and again
-            break
+            return
         points, normals = points[left], normals[left]
-    return found
 
 
 def _best_of(

@@ -16,6 +16,7 @@ angle, offset and radius of two cylinders where the first one is, each over a ba
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
@@ -67,10 +68,9 @@ def find_by_growing(
     axis: tuple[FloatArray, float] | None,
     config: TranConfig,
     *,
-    most: int | None,
     seed: int,
     threads: int,
-) -> list[Proposal]:
+) -> Iterator[Proposal]:
     """Find cylinders as modes of many that were grown from seeds, the one that most of them led to first.
 
     Parameters
@@ -82,15 +82,13 @@ def find_by_growing(
         Unit direction of the axes looked for, and the greatest angle to it, radians.
     config : TranConfig
         Resolved.
-    most : int or None
-        Most cylinders.
     seed : int
     threads : int
         Does not change the result.
 
-    Returns
-    -------
-    list of Proposal
+    Yields
+    ------
+    Proposal
 
     Raises
     ------
@@ -108,12 +106,10 @@ def find_by_growing(
     modes = shift_to_modes(
         np.array([one.model for one in grown]).reshape(-1, 7), math.radians(config.bandwidth_deg), config.bandwidth
     )
-    found = []
     for model, members in modes:
         if len(members) >= max(1.0, config.min_share * len(grown)):
             ends = np.concatenate([grown[k].ends for k in members])
-            found.append(Proposal.spanning(model[:3], model[3:6], float(model[6]), ends, len(members)))
-    return found[:most]
+            yield Proposal.spanning(model[:3], model[3:6], float(model[6]), ends, len(members))
 
 
 class _Garden:

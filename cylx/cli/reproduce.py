@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from cylx import __version__
 from cylx.cli.failures import answer
 from cylx.cli.group import ExampleCommand
 from cylx.cli.options import complete_files, debug_option, talking
@@ -73,7 +74,7 @@ def reproduce(
     from cylx.io import read_object
 
     numbers = sorted({int(name) for name in NUMBERS if name in figures or "all" in figures})
-    chosen = [_only(FIGURES[number], curves) for number in numbers]
+    chosen = _only([FIGURES[number] for number in numbers], curves)
     if data is None and any(figure.needs_scan for figure in chosen):
         needing = [str(figure.number) for figure in chosen if figure.needs_scan]
         which = f"figure {needing[0]} needs" if len(needing) == 1 else f"figures {' and '.join(needing)} need"
@@ -133,7 +134,8 @@ class Study:
 
         table, picture = self.folder / f"figure-{figure.number}.csv", self.folder / f"figure-{figure.number}.png"
         check_writable(picture, overwrite=True)
-        done = self._read(table)
+        made_by = __version__ if scan is None else f"{__version__} {scan.name}"
+        done = self._read(table, made_by)
         draw(figure, summarize(figure, done), done)  # what is needed for the picture is there
         tasks = tasks_of(figure, self.trials, done)
         with self.talk.progress() as observer, observed(observer, f"figure {figure.number}", len(tasks)):
@@ -143,17 +145,17 @@ class Study:
                     done[key] = outcome
                     observer.stage_advanced(1)
                     if monotonic() - saved > SAVED_EVERY:
-                        self._write(table, done)
+                        self._write(table, done, made_by)
                         saved = monotonic()
             finally:
-                self._write(table, done)
+                self._write(table, done, made_by)
         wanted = {key: outcome for key, outcome in done.items() if key.trial < self.trials}
         summaries = summarize(figure, wanted)
         write_bytes(picture, draw(figure, summaries, wanted), overwrite=True)
         _show(figure, summaries)
         self.talk.say(f"figure {figure.number}: {len(tasks)} trials run, written to {table} and {picture}")
 
-    def _read(self, table: Path) -> Trials:
+    def _read(self, table: Path, made_by: str) -> Trials:
         """Read the trials that are done."""
         from cylx.experiments import parse_trials
         from cylx.io import check_writable
@@ -162,35 +164,37 @@ class Study:
         if not table.exists():
             return {}
         try:
-            trials = parse_trials(table.read_text(encoding="utf-8"))
+            trials = parse_trials(table.read_text(encoding="utf-8"), made_by)
         except (OSError, UnicodeDecodeError):
             trials = None
         if trials is None:
             raise OutputError(str(table), "is there, and is no table of trials", "give another folder by --out")
         return trials
 
-    def _write(self, table: Path, trials: Trials) -> None:
+    def _write(self, table: Path, trials: Trials, made_by: str) -> None:
         """Save all trials."""
         from cylx.experiments import header_line, trial_lines
         from cylx.io import write_text
 
-        write_text(table, header_line() + trial_lines(sorted(trials.items())), overwrite=True)
+        write_text(table, header_line() + trial_lines(sorted(trials.items()), made_by), overwrite=True)
 
 
-def _only(figure: Figure, curves: str | None) -> Figure:
-    """Leave the cells of some methods."""
+def _only(figures: list[Figure], curves: str | None) -> list[Figure]:
+    """Leave the cells of some methods, and the figures that have them."""
     if curves is None:
-        return figure
+        return figures
     from cylx.experiments.figures import METHODS
 
     names = [name.strip() for name in curves.split(",")]
     for name in names:
         if name not in METHODS:
             raise UsageError(f"--curves {curves}", f"'{name}' is no method", f"the methods are {', '.join(METHODS)}")
-    cells = tuple(cell for cell in figure.cells if cell.method in names)
-    if not cells:
-        raise UsageError(f"--curves {curves}", f"figure {figure.number} has none of them", "leave --curves out")
-    return figure._replace(cells=cells)
+    cut = [figure._replace(cells=tuple(cell for cell in figure.cells if cell.method in names)) for figure in figures]
+    left = [figure for figure in cut if figure.cells]
+    if not left:
+        numbers = " and ".join(str(figure.number) for figure in figures)
+        raise UsageError(f"--curves {curves}", f"figure {numbers} has none of them", "leave --curves out")
+    return left
 
 
 def _show(figure: Figure, summaries: list[Summary]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +49,11 @@ class ObjectScan:
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         points = a[face] + u * (b - a)[face] + v * (c - a)[face]
         return cls(points + THICKNESS * extent * rng.standard_normal(points.shape), extent)
+
+    @property
+    def name(self) -> str:
+        """What tells it from other scans, eight digits."""
+        return hashlib.sha256(self.points.tobytes()).hexdigest()[:8]
 
     @property
     def center(self) -> FloatArray:

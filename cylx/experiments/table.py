@@ -11,7 +11,7 @@ from cylx import __version__
 from cylx.experiments.figures import Cell
 from cylx.experiments.trials import Outcome
 
-COLUMNS = ("panel", "curve", "x", "trial", "found", "angle_deg", "offset", "radius_percent", "seconds", "cylx_version")
+COLUMNS = ("panel", "curve", "x", "trial", "found", "angle_deg", "offset", "radius_percent", "seconds", "made_by")
 
 
 class Key(NamedTuple):
@@ -38,13 +38,15 @@ class Key(NamedTuple):
 Trials = dict[Key, Outcome]
 
 
-def parse_trials(text: str) -> Trials | None:
-    """Read the trials of this version of cylx; a line that was cut off, or is of another version, is passed over.
+def parse_trials(text: str, made_by: str | None = __version__) -> Trials | None:
+    """Read the trials of this version of cylx; a line that was cut off, or was made by another, is passed over.
 
     Parameters
     ----------
     text : str
         Of the file.
+    made_by : str or None
+        What made the trials that count; None for any.
 
     Returns
     -------
@@ -59,7 +61,7 @@ def parse_trials(text: str) -> Trials | None:
         return None
     trials: Trials = {}
     for row in rows:
-        if len(row) != len(COLUMNS) or row[-1] != __version__:
+        if len(row) != len(COLUMNS) or made_by not in {None, row[-1]}:
             continue
         try:
             key = Key(row[0], row[1], float(row[2]), int(row[3]))
@@ -75,11 +77,11 @@ def header_line() -> str:
     return ",".join(COLUMNS) + "\n"
 
 
-def trial_lines(trials: Iterable[tuple[Key, Outcome]]) -> str:
-    """Give the lines of some trials; what was not measured is empty."""
+def trial_lines(trials: Iterable[tuple[Key, Outcome]], made_by: str = __version__) -> str:
+    """Give the lines of some trials, made by this version of cylx or with some scan; not measured is empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     for key, outcome in trials:
         numbers = ["" if value != value else f"{value:.6g}" for value in outcome[1:]]  # noqa: PLR0124  a NaN is empty
-        writer.writerow([key.panel, key.curve, f"{key.x:g}", key.trial, outcome.found, *numbers, __version__])
+        writer.writerow([key.panel, key.curve, f"{key.x:g}", key.trial, outcome.found, *numbers, made_by])
     return text.getvalue()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -48,20 +49,28 @@ def extract_by_competitor(cloud: PointCloud, config: Config, threads: int, journ
         config = resolve(config, scene)
         radii = radius_range(config, frame)
         ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), frame.noise)
+    findings: list[Finding] = []
+    refused: list[Refusal] = []
     with journal.stage(config.method):
-        proposals = _proposals(frame, radii, config, threads, journal)
+        for proposal in _proposals(frame, radii, config, threads, journal):
+            outcome = _with_extent(proposal, ground, radii, config)
+            if isinstance(outcome, Finding):
+                findings.append(outcome)
+            else:
+                refused.append(outcome)
+            journal.advance()
+            if len(findings) == config.max_cylinders:
+                break
+    counts = Counter(one.reason for one in refused)
+    journal.report(config.method, len(findings) + len(refused), len(findings), counts)
     with journal.stage("labelling"):
-        outcomes = [_with_extent(proposal, ground, radii, config) for proposal in proposals]
-        findings = [one for one in outcomes if isinstance(one, Finding)]
-        refused = [one for one in outcomes if isinstance(one, Refusal)]
-        journal.report(config.method, len(proposals), len(findings), Counter(one.reason for one in refused))
         return conclude(cloud, frame, scene, ground, findings, refused, journal.reports, config)
 
 
 def _proposals(
     frame: Frame, radii: tuple[float, float], config: Config, threads: int, journal: Journal
-) -> list[Proposal]:
-    """Run the method."""
+) -> Iterable[Proposal]:
+    """Run the method, as far as its cylinders are asked for."""
     if config.method == "line-fit":
         fits = ellipses_of_slices(frame, np.zeros(len(frame.points)), radii, config, threads, journal)
         return fit_line_of_centres(fits, frame, config.line_fit)
@@ -69,12 +78,11 @@ def _proposals(
     if config.scene.axis is not None:
         along = np.array(config.scene.axis, dtype=np.float64)
         axis = along / np.linalg.norm(along), math.radians(config.scene.axis_tolerance_deg)
-    most, seed = config.max_cylinders, config.seed
     if config.method == "msac":
-        return find_by_consensus(frame, radii, axis, config.msac, most=most, seed=seed, threads=threads)
+        return find_by_consensus(frame, radii, axis, config.msac, seed=config.seed, threads=threads)
     if config.method == "tran":
-        return find_by_growing(frame, radii, axis, config.tran, most=most, seed=seed, threads=threads)
-    return find_by_spheres(frame, radii, axis, config.jin, most=most, seed=seed, threads=threads)
+        return find_by_growing(frame, radii, axis, config.tran, seed=config.seed, threads=threads)
+    return find_by_spheres(frame, radii, axis, config.jin, seed=config.seed, threads=threads)
 
 
 def _with_extent(proposal: Proposal, ground: Ground, radii: tuple[float, float], config: Config) -> Finding | Refusal:

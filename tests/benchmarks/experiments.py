@@ -63,7 +63,7 @@ def run_cylfit(folder, trials, jobs):
 
 def read(path):
     """Read the trials of a table; none if it is not there."""
-    return parse_trials(path.read_text(encoding="utf-8")) or {} if path.exists() else {}
+    return parse_trials(path.read_text(encoding="utf-8"), None) or {} if path.exists() else {}
 
 
 def summaries_of(folder, number_of_figure, curves=None):
