@@ -1,0 +1,44 @@
+"""How much memory there is, and how much of it a scan will need."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+BASE, A_POINT = 250_000_000, 200
+"""Peak memory of a run, bytes, and of each point in it; measured, see 'Growth' in docs/benchmarks.md."""
+
+
+def memory_needed(scan: str) -> int:
+    """Estimate the peak memory of the extraction of a scan, bytes."""
+    from cylx.io import expected_points
+
+    return BASE + A_POINT * expected_points(scan)
+
+
+def memory_available() -> int | None:
+    """Give the memory that programs can have without swapping, bytes; None where the system does not tell."""
+    try:
+        text = Path("/proc/meminfo").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return None
+    found = re.search(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)
+    return None if found is None else 1024 * int(found[1])
+
+
+def memory_held(process: int) -> int:
+    """Give the resident memory of a process, bytes; 0 where the system does not tell."""
+    try:
+        pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
+        return pages * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError, IndexError, AttributeError):
+        return 0
+
+
+def cores() -> int:
+    """Give the number of cores that this process may use."""
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:  # macOS and Windows do not tell
+        return os.cpu_count() or 1
