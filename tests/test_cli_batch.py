@@ -14,6 +14,7 @@ from test_cli_extract import on_a_terminal
 
 from cylx.cli.batch_options import Many, Processes
 from cylx.cli.display import Conversation
+from cylx.cli.memory import memory_available
 from cylx.cli.scans import find_scans
 from cylx.cli.summary import COLUMNS, table_text
 from cylx.errors import InputError
@@ -434,6 +435,32 @@ def test_jobs_are_as_many_as_there_is_room_for(monkeypatch, jobs, available, pro
     monkeypatch.setattr("cylx.cli.batch_options.cores", lambda: 8)
     assert Many(None, False, jobs, False, None).processes(list("abcd")) == processes
     assert Processes().convert("auto", None, None) == 0
+
+
+@pytest.mark.parametrize(
+    ("files", "available"),
+    [
+        ({}, None),
+        ({"meminfo": "MemFree: 1 kB\nMemAvailable:   2000 kB\n"}, 2_048_000),
+        ({"meminfo": "MemAvailable: 2000 kB\n", "memory.max": "max\n", "memory.current": "5\n"}, 2_048_000),
+        ({"meminfo": "MemAvailable: 2000 kB\n", "memory.max": "900000\n", "memory.current": "500000\n"}, 400_000),
+        (
+            {
+                "meminfo": "MemAvailable: 2000 kB\n",
+                "memory.max": "900000\n",
+                "memory.current": "500000\n",
+                "memory.stat": "anon 7\ninactive_file 100000\n",
+            },
+            500_000,
+        ),
+    ],
+)
+def test_memory_is_what_the_system_and_the_container_leave(tmp_path, monkeypatch, files, available):
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+    monkeypatch.setattr("cylx.cli.memory.MEMINFO", tmp_path / "meminfo")
+    monkeypatch.setattr("cylx.cli.memory.CONTAINER", tmp_path)
+    assert memory_available() == available
 
 
 LAS = bytearray(375)
