@@ -80,8 +80,7 @@ def test_so_is_one_from_standard_input(assert_refused, tmp_path, case):
 
 def test_a_folder_is_refused(assert_refused, tmp_path):
     (tmp_path / "scans.ply").mkdir()
-    assert_refused(3, "scans.ply: is a folder", tmp_path / "scans.ply")
-    assert_refused(3, "is a folder", "/")
+    assert_refused(3, "scans.ply: is a folder, and there is nothing to read in it", tmp_path / "scans.ply")
 
 
 def test_a_scan_that_may_not_be_read_is_refused(assert_refused, scan, monkeypatch):
@@ -160,7 +159,7 @@ def test_a_configuration_that_cannot_be_meant_is_refused(assert_refused, scan, t
         (["--require", "0"], 2, "--require"),
         (["--planes", "0", "--preset", "paper"], 2, "there are no planes"),
         (["-o", "gone/out.json"], 4, "gone/out.json: the folder "),
-        (["-o", "gone/"], 4, "gone/scan.cylinders.json: the folder "),
+        (["-o", "scan.xyz/"], 4, "scan.xyz/: cannot be made: "),
         (["--annotated", "gone/out.ply"], 4, "gone/out.ply: the folder "),
         (["--profile", "gone/times.json"], 4, "gone/times.json: the folder "),
         (["--annotated", "."], 4, "is a folder"),

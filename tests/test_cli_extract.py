@@ -139,7 +139,12 @@ def test_an_existing_folder_takes_the_outputs(run_cylx, scan, tmp_path):
     ("scans", "options", "message"),
     [
         (["a.ply", "a.ply"], {}, "a.cylinders.json: is asked for by two outputs; choose another name"),
-        (["a.ply", "./a.pcd"], {}, "a.cylinders.json: is asked for by two outputs; choose another name"),
+        (
+            ["a.ply", "./a.pcd"],
+            {},
+            "a.cylinders.json: would be the result of a.ply and of ./a.pcd; rename one of them, or take each by itself"
+            " into a folder of its own",
+        ),
         (["a.ply"], {"output": "a.ply"}, "a.ply: is an input as well as an output; choose another name"),
         (["a.ply"], {"annotated": "./a.ply"}, "./a.ply: is an input as well as an output; choose another name"),
         (["a.ply"], {"output": "x", "annotated": "x"}, "x: is asked for by two outputs; choose another name"),
@@ -383,7 +388,8 @@ def test_a_batch_goes_into_a_folder(run_cylx, scans, tmp_path):
     assert (failed.exit_code, failed.stderr) == (4, f"cylx: {tmp_path / 'results'}: no such folder; create it first\n")
     (tmp_path / "results").mkdir()
     assert run_cylx("extract", *scans, "-o", tmp_path / "results", "--no-annotate").exit_code == 0
-    assert names(tmp_path / "results") == ["a.cylinders.json", "b.cylinders.json", "c.cylinders.json"]
+    results = [f"{name}.cylinders.json" for name in "abc"]
+    assert names(tmp_path / "results") == [*results, "summary.csv", "summary.json"]
 
 
 def test_the_same_name_in_two_folders_is_fine(run_cylx, scan, tmp_path):
@@ -392,11 +398,10 @@ def test_the_same_name_in_two_folders_is_fine(run_cylx, scan, tmp_path):
     twin.write_bytes(scan.read_bytes())
     assert run_cylx("extract", scan, twin).exit_code == 0
     failed = run_cylx("extract", scan, twin, "-o", tmp_path, "--overwrite")
-    place = tmp_path / "scan.cylinders.json"
-    assert (failed.exit_code, failed.stderr) == (
-        2,
-        f"cylx: {place}: is asked for by two outputs; choose another name\n",
+    line = (
+        f"cylx: {tmp_path / 'scan.cylinders.json'}: would be the result of {scan} and of {twin}; rename one of them, or"
     )
+    assert (failed.exit_code, failed.stderr) == (2, f"{line} take each by itself into a folder of its own\n")
 
 
 # on a terminal

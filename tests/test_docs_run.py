@@ -18,13 +18,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 PAGES = [
     path for path in PAGES if path.name != "benchmarks.md"
 ]  # its commands take long and have a runner of their own
-RUN, READ = {"bash", "python"}, {"text", "json", "yaml"}
+RUN, READ = {"bash", "python"}, {"text", "json", "yaml", "make"}  # make and workflows have tests of their own
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?")
 
 
@@ -155,3 +156,38 @@ def test_the_code_blocks_run_and_give_what_is_shown(path, bash, clone, monkeypat
         path.write_text(page, encoding="utf-8", newline="\n")
         stale = []
     assert [found for _, found in stale] == [block.text for block, _ in stale], "pytest tests/test_docs_run.py --regen"
+
+
+def only_block(language, word):
+    """Give the text of the block of a language, on the page about the command line, that has a word in it."""
+    page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
+    (text,) = (block.text for block in blocks_of(page) if block.language == language and word in block.text)
+    return text
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="make is not here")
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not here")
+def test_the_makefile_makes_what_is_missing_or_stale(bash, clone):
+    (clone / "Makefile").write_text(only_block("make", "cylx extract"), encoding="utf-8")
+    assert "extract sample_data/pipes.ply" in bash("make")
+    results = [clone / "sample_data" / f"{name}.cylinders.json" for name in ("pipes", "site_mm")]
+    assert all(path.is_file() for path in results)
+    assert "extract" not in bash("make")
+    os.utime(clone / "sample_data" / "site_mm.ply")
+    results[1].unlink()
+    again = bash("make")
+    assert ("extract sample_data/site_mm.ply" in again, "pipes" in again) == (True, False)
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not here")
+def test_the_workflow_fails_when_a_cylinder_has_moved(bash, clone):
+    (job,) = yaml.safe_load(only_block("yaml", "runs-on"))["jobs"].values()
+    steps = [step["run"] for step in job["steps"] if "run" in step]
+    assert len(steps) == 3
+    for step in steps:
+        said = bash(step)
+    assert said == "the same 6 cylinders\n"
+    golden = clone / "sample_data" / "golden" / "pipes.cylinders.json"
+    golden.write_text(golden.read_text().replace('"radius": 0.15', '"radius": 0.16', 1), encoding="utf-8")
+    with pytest.raises(AssertionError, match="radius"):
+        bash(steps[-1])

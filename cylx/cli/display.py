@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -55,16 +55,25 @@ class Conversation:
         with Progress(*columns, TimeElapsedColumn(), console=_console(sys.stderr), transient=True) as display:
             yield ProgressObserver(display)
 
+    @contextmanager
+    def counting(self, total: int) -> Iterator[Callable[[], None]]:
+        """Give what is called after each of many scans; a bar and the time that is left, where somebody can see it."""
+        if self.quiet or not sys.stderr.isatty():
+            yield lambda: None
+            return
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (MofNCompleteColumn(), TextColumn("scans"), BarColumn(24), TextColumn("left"), TimeRemainingColumn())
+        with Progress(*columns, console=_console(sys.stderr), transient=True) as display:
+            task = display.add_task("", total=total)
+            yield lambda: display.advance(task)
+
     def report(self, job: Job, extraction: Extraction) -> None:
         """Say what was found in a scan and where it was written."""
         if self.quiet:
             return
         fits = extraction.cylinders
-        written = [name for name in job.outputs if name != "-"]
-        scan = "standard input" if job.scan == "-" else job.scan
-        count = f"{len(fits)} cylinder{'' if len(fits) == 1 else 's'}"
-        names = " and ".join(filter(None, [", ".join(written[:-1]), *written[-1:]]))
-        tell(f"{scan}: {count}" + (f", written to {names}" if written else ""))
+        tell(found_line(job, len(fits)))
         for warning in extraction.warnings:
             tell(f"warning: {warning}")
         if self.verbose:
@@ -79,6 +88,16 @@ class Conversation:
             show_table(header, rows, err=True)
             if len(shown) < len(fits):
                 tell(f"… and {len(fits) - len(shown)} more; -v shows them all")
+
+
+def found_line(job: Job, found: int) -> str:
+    """Write how many cylinders a scan has, and where they were written."""
+    from cylx.io import printable
+
+    written = [printable(name) for name in job.outputs if name != "-"]
+    scan = "standard input" if job.scan == "-" else printable(job.scan)
+    names = " and ".join(filter(None, [", ".join(written[:-1]), *written[-1:]]))
+    return f"{scan}: {found} cylinder{'' if found == 1 else 's'}" + (f", written to {names}" if written else "")
 
 
 class ProgressObserver:

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.failures import describe_failure, tell
+from cylx.cli.batch_options import Many, made_folder, with_many
 from cylx.cli.group import ExampleCommand
 from cylx.cli.options import complete_files, configured, debug_option, overwrite_option, talking
 from cylx.cli.outputs import Job, check_apart, check_outputs, plan_jobs, write_job
-from cylx.cli.stopwatch import Stopwatch, peak_memory
-from cylx.errors import BatchError, CylxError, NothingFoundError
+from cylx.cli.stopwatch import Stopwatch
 
 if TYPE_CHECKING:
+    from cylx.cli.batch import Batch
     from cylx.cli.display import Conversation
+    from cylx.cli.outcomes import Finished
     from cylx.config import Config
-    from cylx.records import Extraction
 
 
 @click.command(
-    cls=ExampleCommand, examples=["cylx extract scan.ply", "cylx extract scans/*.ply --radius 0.01:0.2 -o results/"]
+    cls=ExampleCommand, examples=["cylx extract scan.ply", "cylx extract scans/ --jobs auto --resume --out-dir results"]
 )
 @click.argument("scans", metavar="SCAN...", nargs=-1, required=True, shell_complete=complete_files)
 @click.option(
@@ -59,6 +60,7 @@ if TYPE_CHECKING:
     shell_complete=complete_files,
     help="Write seconds per stage and peak memory as JSON.",
 )
+@with_many
 @overwrite_option
 @talking
 @debug_option
@@ -73,29 +75,40 @@ def extract(
     threads: int | None,
     require: int | None,
     profile: str | None,
+    many: Many,
     overwrite: bool,
     talk: Conversation,
 ) -> None:
     """Find the cylinders of one or several scans.
 
-    SCAN is a PLY, PCD or XYZ file, or - for standard input. For scan.ply this writes scan.cylinders.json, the
-    cylinders, and scan.annotated.ply, the cloud with the cylinder of each point. Nothing has to be tuned: spacing,
-    noise and radii are read off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
+    SCAN is a PLY, PCD or XYZ file, a folder of them, a pattern in quotes, or - for standard input. For scan.ply this
+    writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of each point.
+    Nothing has to be tuned: spacing, noise and radii are read off the cloud, in whatever unit it comes. A table of what
+    was found goes to standard error.
     """
-    jobs = plan_jobs(scans, output, annotate, annotated, rejected)
-    extras = [] if profile is None else [profile]
-    check_apart(scans, [*(name for job in jobs for name in job.outputs), *extras])
-    check_outputs(jobs, extras, overwrite=overwrite)
-    run = Run(settings, threads, require, overwrite, talk)
-    try:
-        run.extract_all(jobs)
-    finally:
-        if profile is not None and run.profiles:
-            run.write_profile(profile)
+    from cylx.cli.batch import Batch
+    from cylx.cli.scans import find_scans
+
+    output = many.output(output)
+    found = find_scans(scans, recursive=many.recursive)
+    jobs = plan_jobs(found, output, annotate, annotated, rejected)
+    summaries, extras = many.summaries(output, found), [] if profile is None else [profile]
+    check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])
+    batch = Batch(Run(settings, threads, require, overwrite or many.resume, talk), jobs, many, summaries)
+    with made_folder(output):
+        check_outputs(jobs, [], overwrite=overwrite or many.resume)
+        check_outputs([], extras, overwrite=overwrite)
+        batch.check(overwrite=overwrite)
+        try:
+            batch.go()
+        finally:
+            if profile is not None and batch.profiles:
+                write_profile(profile, batch, overwrite=overwrite)
 
 
+@dataclass(frozen=True)
 class Run:
-    """One call of `cylx extract`.
+    """How the scans of one call of `cylx extract` are done.
 
     Parameters
     ----------
@@ -111,40 +124,13 @@ class Run:
         What is shown.
     """
 
-    def __init__(
-        self, settings: Config, threads: int | None, require: int | None, overwrite: bool, talk: Conversation
-    ) -> None:
-        self.settings = settings
-        self.threads = threads
-        self.require = require
-        self.overwrite = overwrite
-        self.talk = talk
-        self.profiles: list[dict[str, object]] = []
+    settings: Config
+    threads: int | None
+    require: int | None
+    overwrite: bool
+    talk: Conversation
 
-    def extract_all(self, jobs: list[Job]) -> None:
-        """Take one scan after the other; of several, a failing one does not stop the rest.
-
-        Raises
-        ------
-        CylxError
-            If the only scan failed.
-        BatchError
-            If some of several failed.
-        """
-        if len(jobs) == 1:
-            self.extract_one(jobs[0])
-            return
-        failed = 0
-        for job in jobs:
-            try:
-                self.extract_one(job)
-            except (CylxError, MemoryError) as failure:
-                tell(describe_failure(failure)[0])
-                failed += 1
-        if failed:
-            raise BatchError(f"{failed} of {len(jobs)} inputs", "failed", "see the lines above; the others are done")
-
-    def extract_one(self, job: Job) -> None:
+    def extract_one(self, job: Job) -> Finished:
         """Read a scan, find its cylinders, write them, and say so.
 
         Raises
@@ -153,10 +139,9 @@ class Run:
             If the scan cannot be read or used.
         OutputError
             If the outputs cannot be written.
-        NothingFoundError
-            If there are fewer cylinders than required; the outputs are written.
         """
         from cylx.cli.display import Observers, observed
+        from cylx.cli.outcomes import Finished
         from cylx.io import read_cloud
         from cylx.pipeline import extract_cylinders
 
@@ -168,21 +153,16 @@ class Run:
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
             with observed(observer, "writing"):
                 write_job(job, extraction, overwrite=self.overwrite)
-        self.profiles.append(stopwatch.report(cloud.rows, len(extraction.cylinders)))
-        self.talk.report(job, extraction)
-        self._check_required(job, extraction)
-
-    def write_profile(self, path: str) -> None:
-        """Write the times of all scans that were finished."""
-        from cylx import __version__
-        from cylx.io import write_text
-
-        profile = {"cylx_version": __version__, "inputs": self.profiles, "peak_memory_bytes": peak_memory()}
-        write_text(path, json.dumps(profile, indent=2) + "\n", overwrite=self.overwrite)
-
-    def _check_required(self, job: Job, extraction: Extraction) -> None:
-        """Refuse to be content with fewer cylinders than required."""
         found = len(extraction.cylinders)
-        if self.require is not None and found < self.require:
-            fault = f"{found} found, {self.require} required"
-            raise NothingFoundError(job.scan, f"cylinders: {fault}", "look at the scan, or require fewer")
+        profile = stopwatch.report(cloud.rows, found)
+        self.talk.report(job, extraction)
+        return Finished(cloud.rows, found, extraction.warnings, profile)
+
+
+def write_profile(path: str, batch: Batch, *, overwrite: bool) -> None:
+    """Write the times of all scans that were finished."""
+    from cylx import __version__
+    from cylx.io import write_text
+
+    profile = {"cylx_version": __version__, "inputs": batch.profiles, "peak_memory_bytes": batch.peak}
+    write_text(path, json.dumps(profile, indent=2) + "\n", overwrite=overwrite)

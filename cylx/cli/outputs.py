@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import os
-import secrets
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -55,7 +54,7 @@ def plan_jobs(
 ) -> list[Job]:
     """Name the outputs of every scan.
 
-    They lie beside the scan, or where `-o` says: a file for one scan, an existing folder for one or several. The
+    They lie beside the scan, or where `-o` says: a file for one scan, a folder for one or several. The
     annotated PLY lies beside the JSON; what was not accepted is written only where `--rejected` says. What comes from
     standard input goes to standard output, unless `-o` says otherwise, and what goes to standard output goes there
     alone, unless an annotated PLY is asked for.
@@ -85,6 +84,7 @@ def plan_jobs(
     jobs = [_plan(scan, output, annotate, annotated) for scan in scans]
     if rejected is not None:
         jobs = [replace(job, rejected=_inside(rejected, job.scan, REJECTED)) for job in jobs]
+    _check_twins(jobs)
     check_apart(scans, [name for job in jobs for name in job.outputs])
     return jobs
 
@@ -149,11 +149,12 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
             """Give the name to write an output to for now; a stream or a device has no other."""
             return stack.enter_context(_moved_at_the_end(name, overwrite=overwrite)) if _is_new_or_file(name) else name
 
+        result = staged(job.result)  # the first is moved last: where the result is, all is
         if job.annotated is not None:
             write_annotated(staged(job.annotated), extraction, overwrite=overwrite)
         if job.rejected is not None:
             write_text(staged(job.rejected), Rejections.of(extraction).to_json(), overwrite=overwrite)
-        write_text(job.result, text, overwrite=overwrite)
+        write_text(result, text, overwrite=overwrite)
 
 
 def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str | None) -> Job:
@@ -184,12 +185,17 @@ def _stem(scan: str) -> str:
 
 def _inside(output: str, scan: str, ending: str) -> str:
     """Name an output that may be a folder to put it into."""
-    return str(Path(output) / (_stem(scan) + ending)) if _is_folder(output) else output
+    return str(Path(output) / (_stem(scan) + ending)) if is_folder(output) else output
 
 
-def _is_folder(output: str) -> bool:
+def is_folder(output: str) -> bool:
     """Tell whether an output is a folder, or is written as if it were one."""
-    return output != STREAM and (Path(output).is_dir() or output.endswith(("/", os.sep)))
+    return output != STREAM and (Path(output).is_dir() or is_slashed(output))
+
+
+def is_slashed(output: str) -> bool:
+    """Tell whether an output is written as a folder, which is then made."""
+    return output.endswith(("/", os.sep))
 
 
 def _check_batch(scans: Sequence[str], output: str | None, annotated: str | None, rejected: str | None) -> None:
@@ -200,11 +206,21 @@ def _check_batch(scans: Sequence[str], output: str | None, annotated: str | None
         raise UsageError("--annotated", "names one file for several inputs", "leave it out, or give one input")
     if output is not None and (output == STREAM or Path(output).is_file()):
         raise UsageError(f"-o {output}", "is one file for several inputs", "give a folder, or one input")
-    if rejected is not None and not _is_folder(rejected):
+    if rejected is not None and not is_folder(rejected):
         raise UsageError(f"--rejected {rejected}", "is one file for several inputs", "give a folder, or one input")
-    for name in (output, rejected):
-        if name is not None and not Path(name).is_dir():
+    for name, made in ((output, output is not None and is_slashed(output)), (rejected, False)):
+        if name is not None and not made and not Path(name).is_dir():
             raise OutputError(name, "no such folder", "create it first")
+
+
+def _check_twins(jobs: Sequence[Job]) -> None:
+    """Refuse two scans whose results would have the same name."""
+    first: dict[str, str] = {}
+    for job in jobs:
+        twin = first.setdefault(os.path.realpath(job.result), job.scan)
+        if twin != job.scan:
+            fault = f"would be the result of {twin} and of {job.scan}"
+            raise UsageError(job.result, fault, "rename one of them, or take each by itself into a folder of its own")
 
 
 def _is_there(scan: str) -> bool:
@@ -220,11 +236,11 @@ def _is_new_or_file(name: str) -> bool:
 @contextlib.contextmanager
 def _moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[Path]:
     """Give a temporary name beside `name`, moved there if all goes well, removed if not."""
-    from cylx.io import check_writable
+    from cylx.io import check_writable, temporary_beside
 
     check_writable(name, overwrite=overwrite)
     target = Path(os.path.realpath(name))
-    staged = target.with_name(f".cylx-{secrets.token_hex(8)}{target.suffix}")
+    staged = temporary_beside(target, target.suffix)
     try:
         yield staged
         staged.replace(target)

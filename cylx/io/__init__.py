@@ -11,20 +11,34 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from cylx.io.annotated import cylinder_colors as cylinder_colors
     from cylx.io.annotated import write_annotated as write_annotated
+    from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
+    from cylx.io.clouds import recorded_name as recorded_name
     from cylx.io.clouds import write_cloud as write_cloud
+    from cylx.io.inputs import printable as printable
     from cylx.io.inputs import read_json as read_json
+    from cylx.io.inputs import sha256_of as sha256_of
     from cylx.io.meshes import read_object as read_object
     from cylx.io.outputs import check_writable as check_writable
     from cylx.io.outputs import write_bytes as write_bytes
     from cylx.io.outputs import write_text as write_text
+    from cylx.io.sizes import expected_points as expected_points
+    from cylx.io.temporary import remove_leftovers as remove_leftovers
+    from cylx.io.temporary import temporary_beside as temporary_beside
 
 _HOMES = {
     "check_writable": "cylx.io.outputs",
+    "cloud_suffixes": "cylx.io.clouds",
     "cylinder_colors": "cylx.io.annotated",
+    "expected_points": "cylx.io.sizes",
+    "printable": "cylx.io.inputs",
     "read_cloud": "cylx.io.clouds",
     "read_json": "cylx.io.inputs",
     "read_object": "cylx.io.meshes",
+    "recorded_name": "cylx.io.clouds",
+    "remove_leftovers": "cylx.io.temporary",
+    "sha256_of": "cylx.io.inputs",
+    "temporary_beside": "cylx.io.temporary",
     "write_annotated": "cylx.io.annotated",
     "write_bytes": "cylx.io.outputs",
     "write_cloud": "cylx.io.clouds",

@@ -58,6 +58,16 @@ def read_cloud(path: str | Path, *, format: str | None = None) -> PointCloud:  #
         return _cloud(table, source.place, Source(_file_name(path), kind, source.sha256))
 
 
+def recorded_name(path: str | Path) -> str:
+    """Give the name by which a result calls a file: without its folder, in characters that UTF-8 has."""
+    return Path(_file_name(path)).name
+
+
+def cloud_suffixes() -> tuple[str, ...]:
+    """Give the suffixes of the files that are taken for clouds in a folder, in small letters."""
+    return (".ply", ".pcd", *TEXT_SUFFIXES)
+
+
 def write_cloud(
     path: str | Path,
     points: NDArray[Any],

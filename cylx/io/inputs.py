@@ -101,6 +101,18 @@ def read_json(path: str | Path) -> dict[str, Any]:
     return document
 
 
+def sha256_of(path: str | Path) -> str:
+    """Give the digest of the bytes of a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is empty.
+    """
+    with open_input(path) as source:
+        return source.sha256
+
+
 def printable(path: str | Path) -> str:
     """Give a path as one line that can be printed, whatever is in it."""
     return text if (text := str(path)).isprintable() else repr(text)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import secrets
 import stat
 import sys
 from contextlib import contextmanager
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from cylx.errors import OutputError
 from cylx.io.inputs import printable
+from cylx.io.temporary import temporary_beside
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -115,7 +115,7 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> None:
 
 @contextmanager
 def _moved_when_done(target: Path) -> Iterator[BinaryIO]:
-    temporary = target.with_name(f".cylx-{secrets.token_hex(8)}.tmp")
+    temporary = temporary_beside(target, ".tmp")
     try:
         with temporary.open("xb") as file:
             yield file

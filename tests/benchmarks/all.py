@@ -43,6 +43,7 @@ QUICK = {
     "peers-clutter": "peers.py scenes/clutter300k_0.ply scenes/clutter1M_0.ply --rounds 2",
     "peers-rack": "peers.py scenes/rack1M_0.ply --max-ratio 0.5",
     "startup": "startup.py",
+    "batch": "batch.py",
 }
 LARGE = {
     "clutter-large": "scenes.py scenes/clutter5M_?.ply",

@@ -1,0 +1,227 @@
+"""Many scans: what has to be done, in this process or in several, and what became of each."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import click
+
+from cylx.cli.display import Conversation, found_line, show_table
+from cylx.cli.failures import DEBUG, tell
+from cylx.cli.memory import cores, memory_needed
+from cylx.cli.outcomes import Finished, Outcome, attempt, check_required, entry_of, failed_outcome, lost_outcome
+from cylx.cli.resume import check_own, finished_before, is_own_json
+from cylx.cli.stopwatch import peak_memory
+from cylx.cli.summary import LIST, is_own_table, list_text, table_text
+from cylx.errors import BatchError, NothingFoundError, OutputError
+
+if TYPE_CHECKING:
+    from cylx.cli.batch_options import Many
+    from cylx.cli.extract import Run
+    from cylx.cli.outputs import Job
+
+SHORT = 20
+"""Of fewer scans than this, each has its line."""
+
+
+class Batch:
+    """Scans that are done in one call of `cylx extract`.
+
+    Parameters
+    ----------
+    run : Run
+        How one is done.
+    jobs : list of Job
+        The scans.
+    many : Many
+        How they are done together.
+    summaries : list of str
+        The table and the list to write, or nothing.
+    """
+
+    def __init__(self, run: Run, jobs: list[Job], many: Many, summaries: list[str]) -> None:
+        self.run = run
+        self.jobs = jobs
+        self.many = many
+        self.summaries = summaries
+        self.outcomes: dict[int, Outcome] = {}
+
+    def check(self, *, overwrite: bool) -> None:
+        """Refuse to replace what cylx did not write, or must not write once more.
+
+        Raises
+        ------
+        OutputError
+            If such a file exists.
+        """
+        from cylx.io import check_writable, printable
+
+        if self.many.resume and not overwrite:
+            check_own(self.jobs)
+        for name in self.summaries:
+            old = Path(name).is_file()
+            if old and not overwrite and not (self.many.resume and self._is_summary(name)):
+                remedy = "give --resume, --overwrite or --no-summary, or another folder"
+                raise OutputError(printable(name), "exists already", remedy)
+            check_writable(name, overwrite=True)
+
+    def go(self) -> None:
+        """Do all scans that are not done, show what became of them, and sum up.
+
+        Raises
+        ------
+        CylxError
+            If the only scan failed.
+        BatchError
+            If some of several failed.
+        """
+        if len(self.jobs) == 1:
+            self._do_only(self.jobs[0])
+            return
+        started = perf_counter()
+        with self.run.talk.counting(len(self.jobs)) as advance:
+            for index, outcome in self._outcomes():
+                self.outcomes[index] = outcome
+                self._show(self.jobs[index], outcome)
+                advance()
+        self._sum_up()
+        failed = sum(outcome.status == "failed" for outcome in self.outcomes.values())
+        self._show_counts(failed, perf_counter() - started)
+        if failed:
+            fault = f"{failed} of {len(self.jobs)} inputs"
+            raise BatchError(fault, "failed", "see the lines above; the others are done")
+
+    @property
+    def profiles(self) -> list[dict[str, object]]:
+        """The times of the scans that were done, in their order."""
+        known = (self.outcomes[index].finished for index in sorted(self.outcomes))
+        return [finished.profile for finished in known if finished is not None and finished.profile is not None]
+
+    @property
+    def peak(self) -> int | None:
+        """The largest memory of any of the processes, bytes."""
+        return max((outcome.peak for outcome in self.outcomes.values() if outcome.peak is not None), default=None)
+
+    def _do_only(self, job: Job) -> None:
+        """Do a single scan in this process, showing how far it is, and its cylinders."""
+        try:
+            before = self._finished_before(job)
+            finished = self.run.extract_one(job) if before is None else before
+            self.outcomes[0] = Outcome("done", finished, peak=peak_memory())
+            if before is not None:
+                self.run.talk.say(f"{found_line(job, finished.cylinders)} before")
+            check_required(job, finished.cylinders, self.run.require)
+        except Exception as failure:
+            known = self.outcomes.get(0)
+            self.outcomes[0] = failed_outcome(failure, None if known is None else known.finished, debug=False)
+            self._sum_up()
+            raise
+        self._sum_up()
+
+    def _outcomes(self) -> Generator[tuple[int, Outcome], None, None]:
+        """Give what became of each scan, by its place in the list: first those that were done before."""
+        todo = []
+        if self.many.resume:
+            self._tidy()
+        for index, job in enumerate(self.jobs):
+            finished = self._finished_before(job)
+            if finished is None:
+                todo.append(index)
+            else:
+                yield index, self._skipped(job, finished)
+        jobs = [self.jobs[index] for index in todo]
+        processes = self.many.processes([job.scan for job in jobs])
+        answers = self._here(jobs) if processes is None else self._elsewhere(jobs, processes)
+        with closing(answers):
+            for place, outcome in answers:
+                yield todo[place], outcome
+
+    def _finished_before(self, job: Job) -> Finished | None:
+        result = finished_before(job, self.run.settings) if self.many.resume else None
+        return None if result is None else Finished(result.input.points, len(result.cylinders), result.warnings)
+
+    def _here(self, jobs: Sequence[Job]) -> Generator[tuple[int, Outcome], None, None]:
+        """Do scans one after the other in this process."""
+        for place, job in enumerate(jobs):
+            yield place, attempt(self._silent(), _debug(), job)
+
+    def _elsewhere(self, jobs: Sequence[Job], processes: int) -> Generator[tuple[int, Outcome], None, None]:
+        """Do scans in other processes, each with its share of the cores."""
+        from cylx.cli.workers import Lost, Workers
+
+        run = self._silent()
+        run = replace(run, threads=run.threads or max(1, cores() // processes))
+
+        workers: Workers[Job, Outcome] = Workers(partial(attempt, run, _debug()), processes, self._tidy)
+        with closing(workers.run(jobs, [memory_needed(job.scan) for job in jobs])) as answers:
+            for place, answer in answers:
+                yield place, lost_outcome(jobs[place], answer.exit_code) if isinstance(answer, Lost) else answer
+
+    def _silent(self) -> Run:
+        return replace(self.run, talk=Conversation(quiet=True))
+
+    def _skipped(self, job: Job, finished: Finished) -> Outcome:
+        try:
+            check_required(job, finished.cylinders, self.run.require)
+        except NothingFoundError as failure:
+            return failed_outcome(failure, finished, debug=False)
+        return Outcome("skipped", finished)
+
+    def _show(self, job: Job, outcome: Outcome) -> None:
+        """Say what became of a scan: always if it failed, otherwise where it is not lost among many."""
+        from cylx.io import printable
+
+        if outcome.trace:
+            tell(outcome.trace)
+        if outcome.status == "failed":
+            tell(f"cylx: {outcome.reason}")
+        if outcome.finished is None or (len(self.jobs) >= SHORT and not self.run.talk.verbose):
+            return
+        if outcome.status == "skipped":
+            self.run.talk.say(f"{found_line(job, outcome.finished.cylinders)} before")
+        else:
+            self.run.talk.say(found_line(job, outcome.finished.cylinders))
+            for warning in outcome.finished.warnings:
+                self.run.talk.say(f"warning: {printable(job.scan)}: {warning}")
+
+    def _show_counts(self, failed: int, seconds: float) -> None:
+        if self.run.talk.quiet:
+            return
+        statuses = [outcome.status for outcome in self.outcomes.values()]
+        found = sum(outcome.finished.cylinders for outcome in self.outcomes.values() if outcome.finished is not None)
+        counts = (len(self.jobs), statuses.count("done"), failed, statuses.count("skipped"), found)
+        header = ["files", "done", "failed", "skipped", "cylinders", "seconds"]
+        show_table(header, [[*map(str, counts), f"{seconds:.1f}"]], err=True)
+
+    def _sum_up(self) -> None:
+        """Write the table of all cylinders and the list of all scans."""
+        from cylx.io import read_json, write_text
+
+        if not self.summaries:
+            return
+        table, listed = self.summaries
+        there = [(job, self.outcomes[index]) for index, job in enumerate(self.jobs)]
+        results = [(job.scan, read_json(job.result)) for job, outcome in there if outcome.finished is not None]
+        write_text(table, table_text(results), overwrite=True)
+        write_text(listed, list_text([entry_of(job, outcome) for job, outcome in there]), overwrite=True)
+
+    def _is_summary(self, name: str) -> bool:
+        return is_own_json(name) if Path(name).name == LIST else is_own_table(name)
+
+    def _tidy(self, process: int | None = None) -> None:
+        """Remove the temporary files that a process has left where we write, or all processes that have ended."""
+        from cylx.io import remove_leftovers
+
+        for folder in {Path(name).resolve().parent for job in self.jobs for name in job.outputs}:
+            remove_leftovers(folder, process)
+
+
+def _debug() -> bool:
+    context = click.get_current_context(silent=True)
+    return context is not None and bool(context.meta.get(DEBUG))

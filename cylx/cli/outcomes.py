@@ -1,0 +1,124 @@
+"""What becomes of a scan among many: a record that a process can send, and a line of the summary."""
+
+from __future__ import annotations
+
+import signal
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from cylx.cli.failures import BUG, UNUSABLE, describe_failure
+from cylx.cli.stopwatch import peak_memory
+from cylx.cli.summary import legible
+from cylx.errors import NothingFoundError
+
+if TYPE_CHECKING:
+    from cylx.cli.extract import Run
+    from cylx.cli.outputs import Job
+
+
+@dataclass(frozen=True)
+class Finished:
+    """What is told of a scan whose outputs are written.
+
+    Parameters
+    ----------
+    points, cylinders : int
+        How many there are.
+    warnings : sequence of str
+        Those of the result.
+    profile : dict, optional
+        Its times.
+    """
+
+    points: int
+    cylinders: int
+    warnings: Sequence[str]
+    profile: dict[str, object] | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a scan.
+
+    Parameters
+    ----------
+    status : str
+        `skipped` is what was done before.
+    finished : Finished or None
+        None if there are no outputs.
+    reason : str
+        Why it failed, in a line.
+    exit_code : int
+        That of this scan alone.
+    peak : int or None
+        Largest memory of its process so far, bytes.
+    trace : str
+        Where it failed, if that is to be shown.
+    """
+
+    status: Literal["done", "skipped", "failed"]
+    finished: Finished | None = None
+    reason: str = ""
+    exit_code: int = 0
+    peak: int | None = None
+    trace: str = ""
+
+
+def check_required(job: Job, found: int, required: int | None) -> None:
+    """Refuse to be content with fewer cylinders than required.
+
+    Raises
+    ------
+    NothingFoundError
+        If there are fewer.
+    """
+    if required is not None and found < required:
+        fault = f"{found} found, {required} required"
+        raise NothingFoundError(job.scan, f"cylinders: {fault}", "look at the scan, or require fewer")
+
+
+def attempt(run: Run, debug: bool, job: Job) -> Outcome:
+    """Do a scan and say what became of it; whatever fails is no reason not to do the next one."""
+    finished = None
+    try:
+        finished = run.extract_one(job)
+        check_required(job, finished.cylinders, run.require)
+    except Exception as failure:  # noqa: BLE001  described, a bug as a bug, with its exit code and its traceback
+        return failed_outcome(failure, finished, debug=debug)
+    return Outcome("done", finished, peak=peak_memory())
+
+
+def failed_outcome(failure: Exception, finished: Finished | None, *, debug: bool) -> Outcome:
+    """Say what became of a scan that failed, with or without its outputs."""
+    line, code = describe_failure(failure)
+    trace = "".join(traceback.format_exception(failure)).rstrip() if debug else ""
+    return Outcome("failed", finished, line.removeprefix("cylx: "), code, peak_memory(), trace)
+
+
+def lost_outcome(job: Job, exit_code: int | None) -> Outcome:
+    """Say what became of a scan whose process has died."""
+    from cylx.io import printable
+
+    place = printable(job.scan)
+    if exit_code is not None and exit_code == -getattr(signal, "SIGKILL", 9):
+        fault = "its process was killed, as the system does when memory runs out"
+        remedy = "give fewer --jobs, thin the scan, or cut it into parts"
+        return Outcome("failed", None, f"{place}: {fault}; {remedy}", UNUSABLE)
+    fault = f"its process ended with {exit_code}, which is a bug of cylx or of a library"
+    return Outcome("failed", None, f"{place}: {fault}; run it by itself with --debug", BUG)
+
+
+def entry_of(job: Job, outcome: Outcome) -> dict[str, object]:
+    """Write down what became of a scan; what was done before is done."""
+    finished = outcome.finished
+    return {
+        "file": legible(job.scan),
+        "status": "failed" if outcome.status == "failed" else "done",
+        "reason": outcome.reason or None,
+        "exit_code": outcome.exit_code,
+        "points": None if finished is None else finished.points,
+        "cylinders": None if finished is None else finished.cylinders,
+        "warnings": [] if finished is None else list(finished.warnings),
+    }

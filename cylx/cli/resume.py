@@ -1,0 +1,108 @@
+"""What an earlier run has left: which scans need not be done again, and which files cylx may replace."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cylx.cli.outputs import STREAM
+from cylx.errors import InputError, OutputError
+
+if TYPE_CHECKING:
+    from cylx.cli.outputs import Job
+    from cylx.config import Config
+    from cylx.results import Result
+
+_MOST_HEADER = 1 << 20
+
+
+def finished_before(job: Job, settings: Config) -> Result | None:
+    """Give the result of a scan if all its outputs are there, from this version, these bytes and these settings.
+
+    Parameters
+    ----------
+    job : Job
+        The scan and its outputs.
+    settings : Config
+        The configuration, before anything is read off the cloud.
+
+    Returns
+    -------
+    Result or None
+        None if the scan has to be done.
+    """
+    from cylx import __version__
+    from cylx.io import read_json, recorded_name, sha256_of
+    from cylx.results import Result
+
+    if STREAM in (job.scan, *job.outputs) or not all(Path(name).is_file() for name in job.outputs):
+        return None
+    try:
+        result = Result.parse(read_json(job.result), job.result)
+        if result.cylx_version != __version__ or result.input.file != recorded_name(job.scan):
+            return None
+        same = is_of_settings(result, settings) and result.input.sha256 == sha256_of(job.scan)
+    except InputError:
+        return None
+    return result if same else None
+
+
+def is_of_settings(result: Result, settings: Config) -> bool:
+    """Say whether settings amount to the configuration of a result.
+
+    What is read off the cloud follows from its spacing, its noise and its bounds, which the result has. Whether spacing
+    and noise were measured, or given, it does not say: if the settings leave them open, either will do.
+
+    Parameters
+    ----------
+    result : Result
+    settings : Config
+    """
+    import numpy as np
+
+    from cylx.records import Scene
+    from cylx.scene import resolve
+
+    bounds, known = result.input.bounds, settings.scene
+    extent = float(np.linalg.norm(np.subtract(bounds.max, bounds.min)))
+    scene = Scene(known.spacing or result.scene.spacing, known.noise or result.scene.noise, extent)
+    return resolve(settings, scene).model_dump(mode="json") == result.config
+
+
+def check_own(jobs: Sequence[Job]) -> None:
+    """Refuse outputs that exist and were not written by cylx.
+
+    Raises
+    ------
+    OutputError
+        If there is one.
+    """
+    from cylx.io import printable
+
+    for job in jobs:
+        for name in job.outputs:
+            if Path(name).is_file() and not _is_own(name, job):
+                fault = "exists already, and cylx did not write it"
+                raise OutputError(printable(name), fault, "choose another name, or give --overwrite")
+
+
+def is_own_json(name: str) -> bool:
+    """Say whether a file is a JSON object with one of our schemas."""
+    from cylx.io import read_json
+
+    try:
+        return str(read_json(name).get("schema")).startswith("cylx.")
+    except InputError:
+        return False
+
+
+def _is_own(name: str, job: Job) -> bool:
+    """Say whether cylx wrote an output; of what bears no sign of it, the result beside it tells."""
+    if name.endswith(".json") or name == job.result:
+        return is_own_json(name)
+    if name == job.annotated:
+        with Path(name).open("rb") as file:
+            return re.search(rb"\nproperty \w+ cylinder_id\s", file.read(_MOST_HEADER)) is not None
+    return Path(job.result).is_file() and is_own_json(job.result)

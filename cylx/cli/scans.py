@@ -1,0 +1,100 @@
+"""Which scans are meant: files as they are, folders, and patterns that no shell has expanded."""
+
+from __future__ import annotations
+
+import glob
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from cylx.cli.outputs import ANNOTATED, STREAM
+from cylx.cli.summary import TABLE, is_own_table
+from cylx.errors import InputError
+
+
+def find_scans(names: Sequence[str], *, recursive: bool) -> list[str]:
+    """Put files in the place of folders and patterns; what comes twice is taken once.
+
+    Of a folder these are the files with a suffix that cylx reads, by name. Hidden files are left out, and what cylx has
+    written itself.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Files, `-`, folders, and patterns such as `scans/*.ply`.
+    recursive : bool
+        Whether the folders in a folder are looked into.
+
+    Raises
+    ------
+    InputError
+        If a folder or a pattern has no scan, or the folder may not be read.
+    """
+    found: dict[str, str] = {}
+    for name in names:
+        for scan in _scans_of(name, recursive=recursive):
+            found.setdefault(scan if scan == STREAM else str(Path(scan).absolute()), scan)
+    return list(found.values())
+
+
+def _scans_of(name: str, *, recursive: bool) -> list[str]:
+    """Give the scans that one argument means."""
+    if name == STREAM:
+        return [name]
+    if Path(name).is_dir():
+        return _scans_in(name, recursive=recursive)
+    if glob.has_magic(name) and not os.path.lexists(name):
+        return _scans_like(name)
+    return [name]
+
+
+def _scans_in(folder: str, *, recursive: bool) -> list[str]:
+    """Give the scans in a folder."""
+    from cylx.io import cloud_suffixes, printable
+
+    suffixes = cloud_suffixes()
+    scans = [path for path in _files_in(folder, recursive=recursive) if Path(path).suffix.lower() in suffixes]
+    scans = [path for path in scans if _is_foreign(path)]
+    if not scans:
+        where = "in it or below" if recursive else "in it"
+        fault = f"is a folder, and there is nothing to read {where}"
+        raise InputError(printable(folder), fault, f"give files, or a folder of {' '.join(suffixes)}")
+    return scans
+
+
+def _scans_like(pattern: str) -> list[str]:
+    """Give the files that a pattern fits; its suffix says what is read, and if it has none, the suffixes of clouds."""
+    from cylx.io import cloud_suffixes, printable
+
+    suffix = Path(pattern).suffix
+    any_suffix = suffix != "" and not glob.has_magic(suffix)
+    files = sorted(path for path in glob.glob(pattern, recursive=True) if Path(path).is_file())  # noqa: PTH207  as a shell
+    suffixes = cloud_suffixes()
+    scans = [path for path in files if any_suffix or Path(path).suffix.lower() in suffixes]
+    scans = [path for path in scans if _is_foreign(path)]
+    if not scans:
+        raise InputError(printable(pattern), "no file is called like this", "check the pattern and the folder")
+    return scans
+
+
+def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
+    """Give the files in a folder by name, then those of its folders; hidden ones and links to folders are left out."""
+
+    def refuse(error: OSError) -> NoReturn:
+        from cylx.io import printable
+
+        fault = f"cannot be read: {(error.strerror or str(error)).lower()}"
+        raise InputError(
+            printable(error.filename or folder), fault, "change its permissions, or leave it out"
+        ) from None
+
+    for place, folders, files in os.walk(folder, onerror=refuse):
+        folders[:] = sorted(name for name in folders if recursive and not name.startswith("."))
+        yield from (os.path.join(place, name) for name in sorted(files) if not name.startswith("."))  # noqa: PTH118
+
+
+def _is_foreign(path: str) -> bool:
+    """Say whether cylx has not written a file that could be taken for a scan."""
+    name = Path(path).name
+    return not name.endswith(ANNOTATED) and not (name == TABLE and is_own_table(path))

@@ -1,0 +1,87 @@
+"""What came out of many scans, as one table of cylinders and one list of files: `summary.csv` and `summary.json`.
+
+Neither holds times or tells what was done in which run: the same scans and settings give the same bytes.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+TABLE, LIST = "summary.csv", "summary.json"
+SCHEMA = "cylx.summary/1"
+
+_VECTORS = ("axis_point", "axis_direction", "start", "end")
+_SCALARS = ("inliers", "rmse", "coverage_deg", "support", "payoff", "confidence")
+_DEVIATIONS = ("radius", "axis_angle_deg", "axis_offset")
+_CATALOGUE = ("decision", "name", "nominal_radius", "likelihood_ratio", "free_radius", "free_radius_sd")
+COLUMNS = (
+    *("file", "id", "radius", "height"),
+    *(f"{name}_{axis}" for name in _VECTORS for axis in "xyz"),
+    *_SCALARS,
+    *(f"uncertainty_{name}" for name in _DEVIATIONS),
+    *(f"catalogue_{name}" for name in _CATALOGUE),
+)
+_PLAIN = re.compile(r"[A-Za-z0-9_./\\:+-][A-Za-z0-9_./\\: +-]*")
+
+
+def table_text(results: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
+    r"""Write the table: a line of names, and a line a cylinder.
+
+    Lines end in LF. Texts with anything but letters, digits and `_./\:+-` are quoted, quotes in them doubled. What a
+    cylinder does not have is empty.
+
+    Parameters
+    ----------
+    results : sequence of (str, mapping)
+        Files, and the objects of their JSON.
+    """
+    header = ",".join(COLUMNS) + "\n"
+    return header + "".join(line for file, result in results for line in _lines(file, result))
+
+
+def list_text(files: Sequence[Mapping[str, object]]) -> str:
+    """Write the list of files, each as a JSON object."""
+    from cylx import __version__
+    from cylx.results import text_of
+
+    return text_of({"schema": SCHEMA, "cylx_version": __version__, "files": list(files)})
+
+
+def legible(name: str) -> str:
+    r"""Give the name of a file in characters that UTF-8 has; a byte that is none becomes `\xff`."""
+    return os.fsencode(name).decode("utf-8", "backslashreplace")
+
+
+def is_own_table(path: str) -> bool:
+    """Say whether a file begins as the table does."""
+    start = ",".join(COLUMNS[:4]).encode()
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(len(start)) == start
+    except OSError:
+        return False
+
+
+def _lines(file: str, result: Mapping[str, Any]) -> Iterator[str]:
+    for cylinder in result["cylinders"]:
+        uncertainty, match = cylinder.get("uncertainty", {}), cylinder.get("catalogue", {})
+        cells = chain(
+            [legible(file), cylinder["id"], cylinder["radius"], cylinder["height"]],
+            chain.from_iterable(cylinder[name] for name in _VECTORS),
+            (cylinder.get(name) for name in _SCALARS),
+            (uncertainty.get(name) for name in _DEVIATIONS),
+            (match.get(name) for name in _CATALOGUE),
+        )
+        yield ",".join(map(_cell, cells)) + "\n"
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return ""
+    text = value if isinstance(value, str) else repr(value)
+    return text if _PLAIN.fullmatch(text) else '"' + text.replace('"', '""') + '"'

@@ -1,0 +1,198 @@
+"""Processes that work on one thing each, started as memory allows; one that is killed takes its thing with it alone.
+
+They are spawned, not forked, and see nothing of Ctrl-C: whoever started them ends them, and if that one dies,
+they end, too.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from multiprocessing.connection import Connection, wait
+from types import FrameType
+from typing import Generic, NamedTuple, NoReturn, TypeVar
+
+from cylx.cli.memory import memory_available, memory_held
+
+Task = TypeVar("Task")
+Answer = TypeVar("Answer")
+
+_GLANCE = 1.0
+"""Seconds after which memory is looked at again."""
+_GRACE = 10.0
+"""Seconds that a process has to leave by itself."""
+_TERMINATED = 128 + 15
+
+
+class Lost(NamedTuple):
+    """What there is instead of an answer if a process has died.
+
+    Parameters
+    ----------
+    exit_code : int or None
+        Of the process; a signal that killed it is negative.
+    """
+
+    exit_code: int | None
+
+
+class Workers(Generic[Task, Answer]):
+    """Some processes, and what they are told to do.
+
+    Parameters
+    ----------
+    work : callable
+        What is done with each task, in a process; it is pickled.
+    most : int
+        Number of processes.
+    bury : callable
+        Is told the id of each process that died or had to be killed.
+    """
+
+    def __init__(self, work: Callable[[Task], Answer], most: int, bury: Callable[[int], None]) -> None:
+        self.work = work
+        self.most = most
+        self.bury = bury
+        self._idle: list[_Worker] = []
+        self._busy: dict[int, _Worker] = {}
+
+    def run(self, tasks: Sequence[Task], needs: Sequence[int]) -> Generator[tuple[int, Answer | Lost], None, None]:
+        """Work on all tasks; they are started in their order.
+
+        Parameters
+        ----------
+        tasks : sequence
+            They are pickled.
+        needs : sequence of int
+            Estimated peak memory of each, bytes.
+
+        Yields
+        ------
+        index : int
+            Of the task that is done.
+        answer : object or Lost
+        """
+        waiting = deque(range(len(tasks)))
+        try:
+            while waiting or self._busy:
+                while waiting and len(self._busy) < self.most and self._fits(waiting[0], needs):
+                    index = waiting.popleft()
+                    self._busy[index] = self._give(tasks[index])
+                ready = wait([worker.pipe for worker in self._busy.values()], _GLANCE)
+                for index in [index for index, worker in self._busy.items() if worker.pipe in ready]:
+                    yield index, self._take(index)
+        finally:
+            self._end()
+
+    def _fits(self, index: int, needs: Sequence[int]) -> bool:
+        """Say whether there is memory for another task beside those that are worked on; the first has no choice."""
+        available = memory_available() if self._busy else None
+        if available is None:
+            return True
+        ours = sum(memory_held(worker.pid) for worker in (*self._busy.values(), *self._idle))
+        return sum(needs[busy] for busy in self._busy) + needs[index] <= available + ours
+
+    def _give(self, task: Task) -> _Worker:
+        """Hand a task to a process that is idle, or to a new one."""
+        while self._idle:
+            worker = self._idle.pop()
+            try:
+                worker.pipe.send(task)
+            except OSError:  # it died since
+                self._part(worker)
+            else:
+                return worker
+        worker = _Worker(self.work)
+        with suppress(OSError):  # if it is dead already, nothing is heard of it
+            worker.pipe.send(task)
+        return worker
+
+    def _take(self, index: int) -> Answer | Lost:
+        """Hear what became of a task."""
+        worker = self._busy.pop(index)
+        try:
+            answer: Answer = worker.pipe.recv()
+        except (EOFError, OSError):
+            self._part(worker)
+            return Lost(worker.process.exitcode)
+        self._idle.append(worker)
+        return answer
+
+    def _end(self) -> None:
+        """End all processes: those that work are told to stop, and killed if they do not."""
+        for worker in self._busy.values():
+            worker.process.terminate()
+        for worker in (*self._busy.values(), *self._idle):
+            self._part(worker)
+        self._busy, self._idle = {}, []
+
+    def _part(self, worker: _Worker) -> None:
+        worker.pipe.close()
+        worker.process.join(_GRACE)
+        if worker.process.exitcode is None:
+            worker.process.kill()
+            worker.process.join()
+        if worker.process.exitcode:
+            self.bury(worker.pid)
+
+
+class _Worker:
+    """A process and the pipe to it."""
+
+    def __init__(self, work: Callable[[Task], Answer]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
+        with _ctrl_c_kept_back():
+            self.process.start()
+        theirs.close()  # so that the end of the process is the end of the pipe
+        self.pid = self.process.pid or 0
+
+
+@contextmanager
+def _ctrl_c_kept_back() -> Iterator[None]:
+    """Keep Ctrl-C from a process that is started meanwhile; this one hears of it afterwards."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # it would let Ctrl-C through if started below
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _serve(pipe: Connection, work: Callable[[Task], Answer]) -> None:
+    """Do what comes through the pipe, until it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, _leave)
+    threading.Thread(target=_follow_parent, daemon=True).start()
+    while True:
+        try:
+            task = pipe.recv()
+        except EOFError:
+            return
+        answer = work(task)
+        with suppress(OSError):
+            pipe.send(answer)
+
+
+def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
+    """Leave by the way on which temporary files are removed."""
+    raise SystemExit(_TERMINATED)
+
+
+def _follow_parent() -> None:
+    """End this process when the one that started it has ended."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        parent.join()
+        os.kill(os.getpid(), signal.SIGTERM)

@@ -1,0 +1,54 @@
+"""How many points a file holds, as far as that can be told without reading it."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+_HEAD = 1 << 16
+_PROMISES = {
+    b"ply": re.compile(rb"[\r\n]element[ \t]+vertex[ \t]+(\d{1,18})\b"),
+    b"#": re.compile(rb"[\r\n]POINTS[ \t]+(\d{1,18})\b"),
+    b"VERSION": re.compile(rb"[\r\n]POINTS[ \t]+(\d{1,18})\b"),
+}
+_BYTES_A_POINT = 8
+"""Of a binary file without a header that we know."""
+
+
+def expected_points(path: str | Path) -> int:
+    """Estimate the number of points in a file: what its header promises, or else what its size allows.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    int
+        0 if there is no such file, or no telling.
+    """
+    try:
+        if not Path(path).is_file():  # a pipe can be read only once
+            return 0
+        size = Path(path).stat().st_size
+        with Path(path).open("rb") as file:
+            head = file.read(_HEAD)
+    except (OSError, ValueError):
+        return 0
+    promised = _promised(head)
+    if promised is not None:
+        return min(promised, size)
+    if b"\0" in head:
+        return size // _BYTES_A_POINT
+    return size * (head.count(b"\n") + 1) // max(len(head), 1)
+
+
+def _promised(head: bytes) -> int | None:
+    """Give the number in a header, None if there is none."""
+    if head.startswith(b"LASF") and len(head) >= 255:
+        long = int.from_bytes(head[247:255], "little") if head[25] >= 4 else 0
+        return long or int.from_bytes(head[107:111], "little")
+    for start, pattern in _PROMISES.items():
+        if head.startswith(start) and (found := pattern.search(head)):
+            return int(found[1])
+    return None
