@@ -10,14 +10,15 @@ import click
 from cylx.cli.failures import describe_failure, tell
 from cylx.cli.group import ExampleCommand
 from cylx.cli.options import complete_files, configured, debug_option, overwrite_option, talking
-from cylx.cli.outputs import Job, check_apart, check_outputs, plan_jobs, write_job
+from cylx.cli.outputs import Job, check_apart, check_format, check_outputs, plan_jobs, write_job
+from cylx.cli.selecting import selecting
 from cylx.cli.stopwatch import Stopwatch, peak_memory
 from cylx.errors import BatchError, CylxError, NothingFoundError
 
 if TYPE_CHECKING:
     from cylx.cli.display import Conversation
     from cylx.config import Config
-    from cylx.records import Extraction
+    from cylx.records import Extraction, Selection
 
 
 @click.command(
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     "--annotated",
     metavar="FILE",
     shell_complete=complete_files,
-    help="Name of the annotated PLY.  [default: beside the JSON]",
+    help="Name of the annotated cloud: PLY, or .pcd, or of a LAS or LAZ scan .las or .laz.  [default: beside the JSON]",
 )
 @click.option(
     "--rejected",
@@ -49,6 +50,7 @@ if TYPE_CHECKING:
     help="Write what was not accepted, and why, as JSON; - for standard output, or a folder.",
 )
 @configured
+@selecting
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
 @click.option(
     "--require", type=click.IntRange(min=1), metavar="N", help="Exit with 5 if fewer cylinders are found; still write."
@@ -70,6 +72,7 @@ def extract(
     annotated: str | None,
     rejected: str | None,
     settings: Config,
+    selection: Selection,
     threads: int | None,
     require: int | None,
     profile: str | None,
@@ -78,15 +81,16 @@ def extract(
 ) -> None:
     """Find the cylinders of one or several scans.
 
-    SCAN is a PLY, PCD or XYZ file, or - for standard input. For scan.ply this writes scan.cylinders.json, the
-    cylinders, and scan.annotated.ply, the cloud with the cylinder of each point. Nothing has to be tuned: spacing,
-    noise and radii are read off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, or - for standard input. For scan.ply this writes
+    scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of each point. Nothing has
+    to be tuned: spacing, noise and radii are read off the cloud, in whatever unit it comes. A table of what was found
+    goes to standard error.
     """
     jobs = plan_jobs(scans, output, annotate, annotated, rejected)
     extras = [] if profile is None else [profile]
     check_apart(scans, [*(name for job in jobs for name in job.outputs), *extras])
     check_outputs(jobs, extras, overwrite=overwrite)
-    run = Run(settings, threads, require, overwrite, talk)
+    run = Run(settings, threads, require, overwrite, talk, selection)
     try:
         run.extract_all(jobs)
     finally:
@@ -109,16 +113,25 @@ class Run:
         Whether files that exist may be replaced.
     talk : Conversation
         What is shown.
+    selection : Selection
+        Which points take part.
     """
 
     def __init__(
-        self, settings: Config, threads: int | None, require: int | None, overwrite: bool, talk: Conversation
+        self,
+        settings: Config,
+        threads: int | None,
+        require: int | None,
+        overwrite: bool,
+        talk: Conversation,
+        selection: Selection,
     ) -> None:
         self.settings = settings
         self.threads = threads
         self.require = require
         self.overwrite = overwrite
         self.talk = talk
+        self.selection = selection
         self.profiles: list[dict[str, object]] = []
 
     def extract_all(self, jobs: list[Job]) -> None:
@@ -159,12 +172,14 @@ class Run:
         from cylx.cli.display import Observers, observed
         from cylx.io import read_cloud
         from cylx.pipeline import extract_cylinders
+        from cylx.selection import select
 
         stopwatch = Stopwatch(job.scan)
         with self.talk.progress() as display:
             observer = Observers(display, stopwatch)
             with observed(observer, "reading"):
-                cloud = read_cloud(job.scan)
+                cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
+            check_format(job, cloud)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
             with observed(observer, "writing"):
                 write_job(job, extraction, overwrite=self.overwrite)

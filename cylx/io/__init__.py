@@ -9,10 +9,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from cylx.io.annotated import check_annotated as check_annotated
     from cylx.io.annotated import cylinder_colors as cylinder_colors
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.clouds import read_cloud as read_cloud
     from cylx.io.clouds import write_cloud as write_cloud
+    from cylx.io.formats import LAS_SUFFIXES as LAS_SUFFIXES
+    from cylx.io.formats import cloud_name as cloud_name
+    from cylx.io.formats import cloud_suffix as cloud_suffix
     from cylx.io.inputs import read_json as read_json
     from cylx.io.meshes import read_object as read_object
     from cylx.io.outputs import check_writable as check_writable
@@ -20,7 +24,11 @@ if TYPE_CHECKING:
     from cylx.io.outputs import write_text as write_text
 
 _HOMES = {
+    "LAS_SUFFIXES": "cylx.io.formats",
+    "check_annotated": "cylx.io.annotated",
     "check_writable": "cylx.io.outputs",
+    "cloud_name": "cylx.io.formats",
+    "cloud_suffix": "cylx.io.formats",
     "cylinder_colors": "cylx.io.annotated",
     "read_cloud": "cylx.io.clouds",
     "read_json": "cylx.io.inputs",
