@@ -93,6 +93,9 @@ def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
     import laspy  # noqa: PLC0415
 
     source.file.seek(0)
+    if facts.compressed:
+        _check_chunks(source, facts, laspy.LasHeader.read_from(source.file))
+        source.file.seek(0)
     with laspy.open(source.file, closefd=False, read_evlrs=False) as reader:
         header = reader.header
         columns = las_dimensions(header.point_format)
@@ -109,6 +112,36 @@ def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
     if done < facts.points:
         raise short_of_points(source.place, facts.points, done)
     return table
+
+
+def _check_chunks(source: Input, facts: LasFacts, header: Any) -> None:  # noqa: ANN401  (of laspy)
+    """Check where the compressed chunks lie: lazrs takes memory for as many and as long ones as it is told of."""
+    import lazrs  # noqa: PLC0415
+
+    record = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
+    damaged = InputError(source.place, "the table of its compressed chunks is damaged", _REMEDY)
+    if record.item_size() != header.point_format.size:
+        raise damaged
+    source.file.seek(facts.start)
+    table = _whole(source)
+    if table == -1:  # it was not known when the points were written
+        source.file.seek(source.size - 8)
+        table = _whole(source)
+    if not facts.start + 8 <= table <= source.size - 8:
+        raise damaged
+    source.file.seek(table + 4)
+    count = int.from_bytes(source.file.read(4), "little")
+    size = record.chunk_size()
+    if count > (facts.points if record.uses_variable_size_chunks() else -(-facts.points // max(size, 1)) + 1):
+        raise damaged
+    source.file.seek(facts.start)
+    chunks = lazrs.read_chunk_table(source.file, record)
+    if any(length < 0 for _, length in chunks) or sum(length for _, length in chunks) > table - facts.start - 8:
+        raise damaged
+
+
+def _whole(source: Input) -> int:
+    return int.from_bytes(source.file.read(8), "little", signed=True)
 
 
 @contextmanager

@@ -93,17 +93,15 @@ def kept_header(source: Input, facts: LasFacts) -> bytes:
     kept, tail = 0, bytearray()
     place, count = facts.evlrs
     for _ in range(count):
+        if place + _EVLR > source.size:
+            break
         source.file.seek(place)
         record = source.file.read(_EVLR)
-        if len(record) < _EVLR:
-            break
         length = struct.unpack_from("<Q", record, 20)[0]
         if length <= _LARGEST_EVLR and place + _EVLR + length <= source.size and record[2:6] != b"copc":
             kept += 1
             tail += record + source.file.read(length)
         place += _EVLR + length
-        if place > source.size:
-            break
     if head[25] >= 4:
         struct.pack_into("<QI", head, 235, facts.start if kept else 0, kept)
     return bytes(head + tail)

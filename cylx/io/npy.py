@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _NPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"
 _MOST_COLUMNS = 1000
+_LYING = 9  # three rows of more columns are rather three columns of points
 _ENOUGH = 1 << 20  # no header is as long
 _REMEDY = "save it again by numpy.save"
 
@@ -105,7 +106,7 @@ def _check_kind(dtype: np.dtype[Any], shape: tuple[int, ...], place: str) -> Non
         missing = missing_coordinates(dtype.names)
         if missing:
             raise InputError(place, f"the structured array has no field {missing}", "give one with x, y and z")
-    elif len(shape) != 2 or not 3 <= shape[1] <= _MOST_COLUMNS:
+    elif len(shape) != 2 or not 3 <= shape[1] <= _MOST_COLUMNS or (shape[0] == 3 and shape[1] > _LYING):
         remedy = "transpose it" if len(shape) == 2 and shape[0] == 3 else "give an array of shape (N, 3) or wider"
         raise InputError(place, f"has the shape {said}, not (N, 3)", remedy)
     elif dtype.kind not in "iuf":
