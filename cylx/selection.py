@@ -1,4 +1,4 @@
-"""Fewer points for a first look: those of a box, of some classes, every so manieth, one a voxel."""
+"""Fewer points for a first look: those of a box or of some classes, one of so many rows, one a voxel."""
 
 from __future__ import annotations
 
