@@ -12,7 +12,8 @@ from cylx.config_catalogue import Given
 from cylx.config_layers import named_options
 from cylx.io import read_cloud
 from cylx.pipeline import extract_cylinders
-from cylx.records import Extraction, Observer, PointCloud, SilentObserver
+from cylx.records import Crop, Extraction, Observer, PointCloud, Selection, SilentObserver
+from cylx.selection import select
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -35,6 +36,11 @@ def extract(
     known_radius: tuple[float, float | None] | None = None,
     catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
+    crop: Crop | None = None,
+    voxel: float | None = None,
+    every: int | None = None,
+    classes: Sequence[int] | None = None,
+    scan: int | None = None,
     threads: int | None = None,
     observer: Observer | None = None,
 ) -> Extraction:
@@ -74,6 +80,16 @@ def extract(
         in the configuration, or just radii. Each fit is drawn to the one that it bears out.
     min_coverage_deg : float, optional
         Smallest angle about its axis that must be seen of a cylinder, degrees.
+    crop : pair of triples of float or None, optional
+        Smallest and largest coordinates of the points that take part; None sets no bound.
+    voxel : float, optional
+        Side of cells of which one point each takes part, in the unit of the points.
+    every : int, optional
+        Only the first of so many rows takes part.
+    classes : sequence of int, optional
+        Classes of the points that take part; for files that have them, as LAS and LAZ do.
+    scan : int, optional
+        The scan of an E57 file to read, the first is 0; by default all.
     threads : int, optional
         Number of threads; the result does not depend on it. By default one a core.
     observer : Observer, optional
@@ -90,7 +106,7 @@ def extract(
     InputError
         If the file cannot be read, or the cloud holds nothing that could be worked on.
     ValueError
-        If the array has not the shape (N, 3).
+        If the array has not the shape (N, 3), or the selection of points is an impossible one.
 
     Examples
     --------
@@ -121,10 +137,14 @@ def extract(
         options=options,
     )
     check_tolerance(settings, options)
-    if isinstance(points_or_path, PointCloud):
+    chosen = None if classes is None else tuple(classes)
+    selection = Selection(crop=crop, voxel=voxel, every=every, classes=chosen, scan=scan)
+    if isinstance(points_or_path, str | PathLike):
+        cloud = read_cloud(Path(points_or_path), scan=scan)
+    elif scan is not None:
+        raise ValueError("a scan can be chosen of a file only")
+    elif isinstance(points_or_path, PointCloud):
         cloud = points_or_path
-    elif isinstance(points_or_path, str | PathLike):
-        cloud = read_cloud(Path(points_or_path))
     else:
         cloud = PointCloud.from_array(points_or_path)
-    return extract_cylinders(cloud, settings, threads=threads, observer=observer or SilentObserver())
+    return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer or SilentObserver())

@@ -6,71 +6,32 @@ input, configuration and seed give the same bytes.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from math import degrees, isfinite
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
+from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
 from cylx import __version__
 from cylx.config_faults import describe_fault
 from cylx.errors import InputError
+from cylx.json_parts import (
+    Count,
+    Input,
+    Length,
+    Matrix,
+    Number,
+    Part,
+    Vector,
+    drop_missing,
+    plain_numbers,
+    text_of,
+)
 
 if TYPE_CHECKING:
     from cylx.records import CylinderFit, Extraction, StageReport
-
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Length = Annotated[Number, Field(ge=0)]
-Count = Annotated[int, Field(ge=0)]
-Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
-Matrix = Annotated[list[Annotated[list[Number], Field(min_length=5, max_length=5)]], Field(min_length=5, max_length=5)]
-
-
-class Part(BaseModel):
-    """A part of the result: unknown keys, wrong types and numbers that are not finite are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
-
-
-class Bounds(Part):
-    """The smallest box along the coordinate axes that holds all finite points."""
-
-    min: Vector
-    """Smallest coordinates, scene units."""
-    max: Vector
-    """Largest coordinates, scene units."""
-
-
-class Input(Part):
-    """The cloud that was looked at."""
-
-    file: str
-    """Name of the file without its folder; `-` for standard input, `<array>` for an array."""
-    format: str
-    """`ply`, `pcd`, `xyz`, … or `array`."""
-    points: Count
-    """Number of points, those without finite coordinates included."""
-    sha256: str | None = None
-    """Digest of the bytes read; absent for an array."""
-    bounds: Bounds
-    """Bounding box of the finite points."""
-
-    @classmethod
-    def of(cls, extraction: Extraction) -> Input:
-        """Write down what was looked at."""
-        cloud = extraction.cloud
-        name = cloud.source.file if cloud.source.format == "array" else Path(cloud.source.file).name
-        return cls(
-            file=name.encode("utf-8", "backslashreplace").decode("utf-8"),
-            format=cloud.source.format,
-            points=cloud.rows,
-            sha256=cloud.source.sha256,
-            bounds=Bounds(min=_numbers(cloud.points.min(axis=0)), max=_numbers(cloud.points.max(axis=0))),
-        )
 
 
 class SceneScale(Part):
@@ -181,12 +142,12 @@ class Measured(Part):
         shape = fit.cylinder
         evidence = {name: float(value) for name, value in fit.evidence.items() if isfinite(value)}
         return {
-            "axis_point": _numbers(shape.point),
-            "axis_direction": _numbers(shape.direction),
+            "axis_point": plain_numbers(shape.point),
+            "axis_direction": plain_numbers(shape.direction),
             "radius": shape.radius,
             "height": shape.height,
-            "start": _numbers(shape.start),
-            "end": _numbers(shape.end),
+            "start": plain_numbers(shape.start),
+            "end": plain_numbers(shape.end),
             "inliers": int(fit.inliers),
             "rmse": float(fit.rmse),
             "coverage_deg": min(degrees(fit.coverage), 360.0),
@@ -289,18 +250,6 @@ class Result(Part):
         return text_of(self.to_object())
 
 
-def drop_missing(parts: Iterable[dict[str, Any]]) -> None:
-    """Take what was not computed out of parts of a JSON object."""
-    for part in parts:
-        for key in [key for key, value in part.items() if value is None]:
-            del part[key]
-
-
-def text_of(content: Mapping[str, Any]) -> str:
-    """Give the text of a JSON file, with a newline at its end."""
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-
-
 def result_schema() -> dict[str, Any]:
     """Give the JSON schema of the result file."""
     return Result.model_json_schema(by_alias=True)
@@ -310,8 +259,3 @@ def _stage(report: StageReport) -> Stage:
     """Write down a stage's counts."""
     rejected = {reason: int(count) for reason, count in report.rejected.items()}
     return Stage(name=report.name, considered=int(report.considered), kept=int(report.kept), rejected=rejected)
-
-
-def _numbers(vector: Iterable[float]) -> list[float]:
-    """Turn a vector into plain floats, without negative zeros."""
-    return [float(x) + 0.0 for x in vector]

@@ -10,14 +10,14 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
     "api", "baselines", "catalogue", "cli", "config", "consensus", "cylx", "errors", "evaluation", "evidence",
-    "experiments", "game", "geometry", "io", "measures", "noise", "open3d_door", "payoff", "pipeline", "records",
-    "rejections", "results", "scene", "stages", "synthetic",
+    "experiments", "game", "geometry", "io", "json_parts", "measures", "noise", "open3d_door", "payoff", "pipeline",
+    "records", "rejections", "results", "scene", "selection", "stages", "synthetic",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},
     "__main__": {"cli"},
     "cli": EVERYTHING,
-    "api": {"config", "errors", "io", "pipeline", "records"},
+    "api": {"config", "errors", "io", "pipeline", "records", "selection"},
     "consensus": {"records"},
     "experiments": {"config", "cylx", "errors", "geometry", "open3d_door", "pipeline", "records", "synthetic"},
     "measures": {"geometry", "records"},
@@ -32,8 +32,10 @@ MAY_IMPORT = {
     "noise": {"geometry"},
     "payoff": {"game", "geometry"},
     "scene": {"catalogue", "config", "errors", "geometry", "noise", "records"},
-    "results": {"config", "cylx", "errors", "geometry", "records"},
-    "rejections": {"cylx", "records", "results"},
+    "results": {"config", "cylx", "errors", "geometry", "json_parts", "records"},
+    "rejections": {"cylx", "json_parts", "records", "results"},
+    "json_parts": {"records"},
+    "selection": {"errors", "records"},
     "io": {"errors", "geometry", "open3d_door", "records"},
     "open3d_door": set(),
     "records": {"catalogue", "config", "geometry"},
@@ -53,6 +55,7 @@ OWN_SECTION = {
 ONLY_IN = {
     "click": "cli",
     "laspy": "io",
+    "lazrs": "io",
     "matplotlib": "experiments",
     "libusb_package": "open3d_door",
     "open3d": "open3d_door",

@@ -3,6 +3,7 @@
 import dataclasses
 import errno
 import io
+import struct
 
 import numpy as np
 import pytest
@@ -199,3 +200,14 @@ def test_colours_are_distinct_stable_and_never_grey():
     assert np.array_equal(cylinder_colors(np.array([3, -1, 0])), [colors[3], GREY, colors[0]])
     neighbours = np.abs(np.diff(colors.astype(int), axis=0)).max(axis=1)
     assert neighbours.min() > 50
+
+
+def test_a_list_property_does_not_fit_into_pcd(tmp_path, make_extraction):
+    rows = b"".join(struct.pack("<fffBi", *point, 1, 7) for point in [(0, 0, 0), (1, 0, 0), (0, 1, 0)])
+    header = "ply\nformat binary_little_endian 1.0\nelement vertex 3\n"
+    header += "".join(f"property float {axis}\n" for axis in "xyz") + "property list uchar int near\nend_header\n"
+    (tmp_path / "scan.ply").write_bytes(header.encode() + rows)
+    found = make_extraction(read_cloud(tmp_path / "scan.ply"))
+    with pytest.raises(OutputError, match="PCD cannot hold the list property 'near'; choose a name"):
+        write_annotated(tmp_path / "out.pcd", found)
+    assert not (tmp_path / "out.pcd").exists()

@@ -163,12 +163,13 @@ TEXT = {
     b"nan nan nan\n": NO_FINITE,
 }
 OTHER = {
-    b"LASF\0\0": "scan: is neither PLY nor PCD nor text; convert it to PLY",
+    b"\0\1\2\3": "scan: is of no format that cylx reads, and no text; convert it to PLY",
+    b"LASF\0\0": "scan: the file ends within the LAS header; get a complete copy of the file",
     b"#!/bin/sh\necho\nexit 0\n": f"scan:3: x is 'exit', not a number; {NUMBERS}",
 }
 TABLE = [
     (suffix, data, message)
-    for suffix, table in ((".ply", PLY), (".pcd", PCD), (".xyz", TEXT), (".pts", TEXT), ("", OTHER), (".las", OTHER))
+    for suffix, table in ((".ply", PLY), (".pcd", PCD), (".xyz", TEXT), (".pts", TEXT), ("", OTHER), (".scan", OTHER))
     for data, message in table.items()
 ]
 
@@ -257,5 +258,5 @@ def test_a_machine_that_is_too_small(at_home, monkeypatch):
 
 
 def test_a_format_nobody_knows():
-    with pytest.raises(UsageError, match="format: unknown format 'las'; use one of ply, pcd, xyz"):
-        read_cloud("scan.las", format="las")
+    with pytest.raises(UsageError, match="format: unknown format 'obj'; use one of ply, pcd, xyz, las, e57, npy"):
+        read_cloud("scan.las", format="obj")

@@ -143,7 +143,7 @@ class Batch:
                 yield todo[place], outcome
 
     def _finished_before(self, job: Job) -> Finished | None:
-        result = finished_before(job, self.run.settings) if self.many.resume else None
+        result = finished_before(job, self.run.settings, self.run.selection) if self.many.resume else None
         return None if result is None else Finished(result.input.points, len(result.cylinders), result.warnings)
 
     def _here(self, jobs: Sequence[Job]) -> Generator[tuple[int, Outcome], None, None]:

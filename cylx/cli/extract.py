@@ -11,7 +11,8 @@ import click
 from cylx.cli.batch_options import Many, made_folder, with_many
 from cylx.cli.group import ExampleCommand
 from cylx.cli.options import complete_files, configured, debug_option, overwrite_option, talking
-from cylx.cli.outputs import Job, check_apart, check_outputs, plan_jobs, write_job
+from cylx.cli.outputs import Job, check_apart, check_format, check_outputs, plan_jobs, write_job
+from cylx.cli.selecting import selecting
 from cylx.cli.stopwatch import Stopwatch
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from cylx.cli.display import Conversation
     from cylx.cli.outcomes import Finished
     from cylx.config import Config
+    from cylx.records import Selection
 
 
 @click.command(
@@ -41,7 +43,7 @@ if TYPE_CHECKING:
     "--annotated",
     metavar="FILE",
     shell_complete=complete_files,
-    help="Name of the annotated PLY.  [default: beside the JSON]",
+    help="Name of the annotated cloud: PLY, or .pcd, or of a LAS or LAZ scan .las or .laz.  [default: beside the JSON]",
 )
 @click.option(
     "--rejected",
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
     help="Write what was not accepted, and why, as JSON; - for standard output, or a folder.",
 )
 @configured
+@selecting
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
 @click.option(
     "--require", type=click.IntRange(min=1), metavar="N", help="Exit with 5 if fewer cylinders are found; still write."
@@ -72,6 +75,7 @@ def extract(
     annotated: str | None,
     rejected: str | None,
     settings: Config,
+    selection: Selection,
     threads: int | None,
     require: int | None,
     profile: str | None,
@@ -81,10 +85,10 @@ def extract(
 ) -> None:
     """Find the cylinders of one or several scans.
 
-    SCAN is a PLY, PCD or XYZ file, a folder of them, a pattern in quotes, or - for standard input. For scan.ply this
-    writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of each point.
-    Nothing has to be tuned: spacing, noise and radii are read off the cloud, in whatever unit it comes. A table of what
-    was found goes to standard error.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, a folder of them, a pattern in quotes, or - for standard input.
+    For scan.ply this writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of
+    each point. Nothing has to be tuned: spacing, noise and radii are read off the cloud, in whatever unit it comes. A
+    table of what was found goes to standard error.
     """
     from cylx.cli.batch import Batch
     from cylx.cli.scans import find_scans
@@ -94,7 +98,8 @@ def extract(
     jobs = plan_jobs(found, output, annotate, annotated, rejected)
     summaries, extras = many.summaries(output, found), [] if profile is None else [profile]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])
-    batch = Batch(Run(settings, threads, require, overwrite or many.resume, talk), jobs, many, summaries)
+    run = Run(settings, threads, require, overwrite or many.resume, talk, selection)
+    batch = Batch(run, jobs, many, summaries)
     with made_folder(output):
         check_outputs(jobs, [], overwrite=overwrite or many.resume)
         check_outputs([], extras, overwrite=overwrite)
@@ -122,6 +127,8 @@ class Run:
         Whether files that exist may be replaced.
     talk : Conversation
         What is shown.
+    selection : Selection
+        Which points take part.
     """
 
     settings: Config
@@ -129,6 +136,7 @@ class Run:
     require: int | None
     overwrite: bool
     talk: Conversation
+    selection: Selection
 
     def extract_one(self, job: Job) -> Finished:
         """Read a scan, find its cylinders, write them, and say so.
@@ -144,12 +152,14 @@ class Run:
         from cylx.cli.outcomes import Finished
         from cylx.io import read_cloud
         from cylx.pipeline import extract_cylinders
+        from cylx.selection import select
 
         stopwatch = Stopwatch(job.scan)
         with self.talk.progress() as display:
             observer = Observers(display, stopwatch)
             with observed(observer, "reading"):
-                cloud = read_cloud(job.scan)
+                cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
+            check_format(job, cloud)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
             with observed(observer, "writing"):
                 write_job(job, extraction, overwrite=self.overwrite)

@@ -10,10 +10,11 @@ import click
 from cylx.cli.failures import answer, tell
 from cylx.cli.group import ExampleCommand
 from cylx.cli.options import complete_files, debug_option, json_option
+from cylx.cli.selecting import selecting
 from cylx.errors import InputError
 
 if TYPE_CHECKING:
-    from cylx.records import PointCloud
+    from cylx.records import PointCloud, Selection
 
 
 @click.command(cls=ExampleCommand, examples=["cylx info scan.ply", "cylx info scan.ply --json | jq .scene.spacing"])
@@ -21,19 +22,22 @@ if TYPE_CHECKING:
 @click.option(
     "--seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Seed of the measurement."
 )
+@selecting
 @json_option
 @debug_option
-def info(*, scan: str, seed: int, as_json: bool) -> None:
+def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
     """Show what is in a scan: fields, points, bounds, spacing, noise.
 
-    SCAN is a PLY, PCD or XYZ file, or - for standard input. Spacing and noise are measured as 'cylx extract' does, in
-    the unit of the scan.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, or - for standard input. Spacing and noise are measured as
+    'cylx extract' does, in the unit of the scan. If only some points take part, bounds and scale are theirs.
     """
     from cylx.io import read_cloud
     from cylx.scene import check_usable, measure_scene
+    from cylx.selection import select
 
-    cloud = read_cloud(scan)
-    facts = describe_cloud(cloud)
+    whole = read_cloud(scan, scan=selection.scan)
+    cloud = select(whole, selection)
+    facts = describe_cloud(whole, cloud)
     try:
         check_usable(cloud.points, cloud.source.file)
         scene = measure_scene(cloud.points, seed)
@@ -43,9 +47,9 @@ def info(*, scan: str, seed: int, as_json: bool) -> None:
     answer(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if as_json else as_text(facts))
 
 
-def describe_cloud(cloud: PointCloud) -> dict[str, Any]:
-    """Give what a file says of itself as a JSON object; bounds and extent only where there are finite points."""
-    table = cloud.table
+def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
+    """Give what a file says of itself as a JSON object; bounds and extent are those of the points that take part."""
+    table = whole.table
     names = ("x", "y", "z") if table is None or table.dtype.names is None else table.dtype.names
     fields = [{"name": n, "type": "float64" if table is None else str(table.dtype[n])} for n in names]
     facts: dict[str, Any] = {
@@ -53,9 +57,11 @@ def describe_cloud(cloud: PointCloud) -> dict[str, Any]:
         "format": cloud.source.format,
         "sha256": cloud.source.sha256,
         "points": cloud.rows,
-        "finite": len(cloud.points),
+        "finite": len(whole.points),
         "fields": fields,
     }
+    if cloud is not whole:
+        facts["selected"] = len(cloud.points)
     if len(cloud.points):
         low, high = cloud.points.min(axis=0), cloud.points.max(axis=0)
         facts["bounds"] = {"min": low.tolist(), "max": high.tolist()}
@@ -70,6 +76,7 @@ def as_text(facts: dict[str, Any]) -> str:
         "file": facts["file"],
         "format": facts["format"],
         "points": f"{facts['points']}, {facts['finite']} of them finite",
+        **({"selected": str(facts["selected"])} if "selected" in facts else {}),
         "fields": ", ".join(f"{field['name']} ({field['type']})" for field in facts["fields"]),
     }
     if "bounds" in facts:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 from cylx.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction
+    from cylx.records import Extraction, PointCloud
 
-RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated.ply", ".rejected.json", ".truth.json"
+RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
 STREAM = "-"
 
 
@@ -29,7 +29,7 @@ class Job:
     result : str
         The JSON, `-` for standard output.
     annotated : str or None
-        The annotated PLY, `-` for standard output, None for none.
+        The annotated cloud, `-` for standard output, None for none.
     rejected : str or None
         The JSON of what was not accepted, `-` for standard output, None for none.
     """
@@ -130,6 +130,20 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
         check_writable(name, overwrite=overwrite)
 
 
+def check_format(job: Job, cloud: PointCloud) -> None:
+    """Refuse an annotated cloud of a format that could not hold the scan, before anything is computed.
+
+    Raises
+    ------
+    OutputError
+        If it could not.
+    """
+    from cylx.io import check_annotated
+
+    if job.annotated is not None:
+        check_annotated(job.annotated, cloud)
+
+
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
     """Write the JSON, the annotated PLY and what was not accepted of one scan, all or nothing.
 
@@ -172,15 +186,25 @@ def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str |
         return Job(scan, result, None)
     if result != STREAM:
         folder_and_stem = result.removesuffix(RESULT) if result.endswith(RESULT) else str(Path(result).with_suffix(""))
-        return Job(scan, result, folder_and_stem + ANNOTATED)
+        return Job(scan, result, folder_and_stem + _annotated(scan))
     if scan == STREAM:
         raise UsageError("--annotate", "the annotated cloud has no name", "give one by --annotated FILE")
-    return Job(scan, result, str(Path(scan).parent / (stem + ANNOTATED)))
+    return Job(scan, result, str(Path(scan).parent / (stem + _annotated(scan))))
 
 
 def _stem(scan: str) -> str:
     """Give the NAME in the names of the outputs of a scan."""
-    return "stdin" if scan == STREAM else Path(scan).stem
+    from cylx.io import cloud_name
+
+    return "stdin" if scan == STREAM else Path(cloud_name(scan)).stem
+
+
+def _annotated(scan: str) -> str:
+    """Give the ending of the annotated cloud: LAS and LAZ keep their format, the others become PLY."""
+    from cylx.io import LAS_SUFFIXES
+
+    suffix = Path(scan).suffix.lower()
+    return ANNOTATED + (suffix if suffix in LAS_SUFFIXES else ".ply")
 
 
 def _inside(output: str, scan: str, ending: str) -> str:

@@ -13,13 +13,14 @@ from cylx.errors import InputError, OutputError
 if TYPE_CHECKING:
     from cylx.cli.outputs import Job
     from cylx.config import Config
+    from cylx.records import Selection
     from cylx.results import Result
 
 _MOST_HEADER = 1 << 20
 
 
-def finished_before(job: Job, settings: Config) -> Result | None:
-    """Give the result of a scan if all its outputs are there, from this version, these bytes and these settings.
+def finished_before(job: Job, settings: Config, selection: Selection) -> Result | None:
+    """Give the result of a scan if all its outputs are there, from this version, these bytes, points and settings.
 
     Parameters
     ----------
@@ -27,6 +28,8 @@ def finished_before(job: Job, settings: Config) -> Result | None:
         The scan and its outputs.
     settings : Config
         The configuration, before anything is read off the cloud.
+    selection : Selection
+        Which points take part.
 
     Returns
     -------
@@ -43,7 +46,8 @@ def finished_before(job: Job, settings: Config) -> Result | None:
         result = Result.parse(read_json(job.result), job.result)
         if result.cylx_version != __version__ or result.input.file != recorded_name(job.scan):
             return None
-        same = is_of_settings(result, settings) and result.input.sha256 == sha256_of(job.scan)
+        same = is_of_settings(result, settings) and result.input.is_of(selection)
+        same = same and result.input.sha256 == sha256_of(job.scan)
     except InputError:
         return None
     return result if same else None
@@ -104,5 +108,5 @@ def _is_own(name: str, job: Job) -> bool:
         return is_own_json(name)
     if name == job.annotated:
         with Path(name).open("rb") as file:
-            return re.search(rb"\nproperty \w+ cylinder_id\s", file.read(_MOST_HEADER)) is not None
+            return re.search(rb"\bcylinder_id\b", file.read(_MOST_HEADER)) is not None
     return Path(job.result).is_file() and is_own_json(job.result)

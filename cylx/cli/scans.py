@@ -51,10 +51,10 @@ def _scans_of(name: str, *, recursive: bool) -> list[str]:
 
 def _scans_in(folder: str, *, recursive: bool) -> list[str]:
     """Give the scans in a folder."""
-    from cylx.io import cloud_suffixes, printable
+    from cylx.io import cloud_suffix, cloud_suffixes, printable
 
     suffixes = cloud_suffixes()
-    scans = [path for path in _files_in(folder, recursive=recursive) if Path(path).suffix.lower() in suffixes]
+    scans = [path for path in _files_in(folder, recursive=recursive) if cloud_suffix(path) in suffixes]
     scans = [path for path in scans if _is_foreign(path)]
     if not scans:
         where = "in it or below" if recursive else "in it"
@@ -65,13 +65,13 @@ def _scans_in(folder: str, *, recursive: bool) -> list[str]:
 
 def _scans_like(pattern: str) -> list[str]:
     """Give the files that a pattern fits; its suffix says what is read, and if it has none, the suffixes of clouds."""
-    from cylx.io import cloud_suffixes, printable
+    from cylx.io import cloud_suffix, cloud_suffixes, printable
 
     suffix = Path(pattern).suffix
     any_suffix = suffix != "" and not glob.has_magic(suffix)
     files = sorted(path for path in glob.glob(pattern, recursive=True) if Path(path).is_file())  # noqa: PTH207  as a shell
     suffixes = cloud_suffixes()
-    scans = [path for path in files if any_suffix or Path(path).suffix.lower() in suffixes]
+    scans = [path for path in files if any_suffix or cloud_suffix(path) in suffixes]
     scans = [path for path in scans if _is_foreign(path)]
     if not scans:
         raise InputError(printable(pattern), "no file is called like this", "check the pattern and the folder")
@@ -97,4 +97,4 @@ def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
 def _is_foreign(path: str) -> bool:
     """Say whether cylx has not written a file that could be taken for a scan."""
     name = Path(path).name
-    return not name.endswith(ANNOTATED) and not (name == TABLE and is_own_table(path))
+    return Path(name).stem[-len(ANNOTATED) :] != ANNOTATED and not (name == TABLE and is_own_table(path))

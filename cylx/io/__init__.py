@@ -9,12 +9,16 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from cylx.io.annotated import check_annotated as check_annotated
     from cylx.io.annotated import cylinder_colors as cylinder_colors
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
     from cylx.io.clouds import recorded_name as recorded_name
     from cylx.io.clouds import write_cloud as write_cloud
+    from cylx.io.formats import LAS_SUFFIXES as LAS_SUFFIXES
+    from cylx.io.formats import cloud_name as cloud_name
+    from cylx.io.formats import cloud_suffix as cloud_suffix
     from cylx.io.inputs import printable as printable
     from cylx.io.inputs import read_json as read_json
     from cylx.io.inputs import sha256_of as sha256_of
@@ -27,7 +31,11 @@ if TYPE_CHECKING:
     from cylx.io.temporary import temporary_beside as temporary_beside
 
 _HOMES = {
+    "LAS_SUFFIXES": "cylx.io.formats",
+    "check_annotated": "cylx.io.annotated",
     "check_writable": "cylx.io.outputs",
+    "cloud_name": "cylx.io.formats",
+    "cloud_suffix": "cylx.io.formats",
     "cloud_suffixes": "cylx.io.clouds",
     "cylinder_colors": "cylx.io.annotated",
     "expected_points": "cylx.io.sizes",

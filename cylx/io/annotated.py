@@ -1,20 +1,26 @@
-"""The annotated PLY: the cloud as it came, and what was found in it."""
+"""The annotated cloud: the points as they came, and what was found in them, as PLY, PCD, LAS or LAZ."""
 
 from __future__ import annotations
 
 import colorsys
+import shutil
+import tempfile
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from cylx.errors import OutputError
+from cylx.io.formats import LAS_SUFFIXES
+from cylx.io.inputs import excerpt, printable
 from cylx.io.names import mended_names
 from cylx.io.outputs import open_output
+from cylx.io.pcd import write_pcd
 from cylx.io.ply import BLOCK, ply_type, write_ply
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -28,12 +34,16 @@ _GOLDEN = 0.6180339887498949
 def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool = False) -> None:
     """Write all points of the input with all their properties, and the cylinder of each.
 
-    Every row of the input is there, in its order, as it was read: points without finite coordinates too. To its
-    properties come `cylinder_id` (int, -1 for none), `residual` (float, the signed distance to that cylinder's surface,
-    + is outside, scene units, NaN for none), and `red`, `green`, `blue` (uchar) by cylinder, grey for none. Properties
-    of the input with these names, and the `alpha` of its colours, are kept as `orig_red` and so on. Names that PLY
-    cannot hold are mended; integers of 8 bytes, which PLY does not have, become double. Other elements of a PLY, such
-    as faces, are dropped. The file is a binary little endian PLY.
+    Every row of the input is there, in its order, as it was read: points without finite coordinates too, and those that
+    took no part. To its properties come `cylinder_id` (int, -1 for none), `residual` (float, the signed distance to
+    that cylinder's surface, + is outside, scene units, NaN for none), and `red`, `green`, `blue` (uchar) by cylinder,
+    grey for none. Properties of the input with these names, and the `alpha` of its colours, are kept as `orig_red` and
+    so on. Names that PLY cannot hold are mended; integers of 8 bytes, which PLY does not have, become double. Other
+    elements of a PLY, such as faces, are dropped.
+
+    The file is a binary little endian PLY, but for a name that ends in .pcd, which gives a binary PCD, and for one in
+    .las or .laz, if the input was LAS or LAZ: `cylinder_id` and `residual` are extra bytes there, and there are colours
+    if the point format has them.
 
     Parameters
     ----------
@@ -47,13 +57,46 @@ def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool
     Raises
     ------
     OutputError
-        If the file exists and may not be replaced, or cannot be written.
+        If the file exists and may not be replaced, or cannot be written, or its format cannot hold the points.
     """
     cloud = extraction.cloud
-    kept = _kept(cloud)
-    dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OURS.items()])
+    check_annotated(path, cloud)
     with open_output(path, overwrite=overwrite) as file:
-        write_ply(file, dtype, cloud.rows, _blocks(extraction, kept, dtype))
+        suffix = Path(path).suffix.lower()
+        if suffix in LAS_SUFFIXES:
+            _write_las(file, extraction, compressed=suffix == ".laz")
+            return
+        kept = _kept(cloud)
+        dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OURS.items()])
+        if suffix == ".pcd":
+            write_pcd(file, np.concatenate([*_blocks(extraction, kept, dtype)]))
+        else:
+            write_ply(file, dtype, cloud.rows, _blocks(extraction, kept, dtype))
+
+
+def check_annotated(path: str | Path, cloud: PointCloud) -> None:
+    """Refuse a format that could not hold the points of a cloud, before anything is computed for it.
+
+    Parameters
+    ----------
+    path : str or Path
+        Where the annotated cloud is to go.
+    cloud : PointCloud
+
+    Raises
+    ------
+    OutputError
+        If it is LAS or LAZ, and the cloud does not come from either, or PCD, and a property is a list.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix in LAS_SUFFIXES and (cloud.source.header is None or cloud.table is None):
+        raise OutputError(printable(path), "the input is neither LAS nor LAZ", "choose a name that ends in .ply")
+    if suffix == ".pcd" and cloud.table is not None:
+        dtype = cloud.table.dtype
+        lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
+        if lists:
+            fault = f"PCD cannot hold the list property {excerpt(lists[0])}"
+            raise OutputError(printable(path), fault, "choose a name that ends in .ply")
 
 
 def cylinder_colors(ids: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
@@ -111,18 +154,40 @@ def _columns(cloud: PointCloud) -> Mapping[str, NDArray[Any]] | NDArray[np.void]
 def _blocks(
     extraction: Extraction, kept: dict[str, tuple[str, np.dtype[Any]]], dtype: np.dtype[np.void]
 ) -> Iterator[NDArray[np.void]]:
+    columns = _columns(extraction.cloud)
+    for part, ours in _findings(extraction):
+        block = np.empty(len(ours["cylinder_id"]), dtype)
+        for name, (new, _) in kept.items():
+            block[new] = columns[name][part]
+        for name, values in ours.items():
+            block[name] = values
+        yield block
+
+
+def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray[Any]]]]:
+    """Give what was found about the rows, piece by piece, by the names of our properties."""
     cloud = extraction.cloud
-    columns = _columns(cloud)
     labels = cloud.spread(extraction.labels, -1)
     residuals = cloud.spread(extraction.residuals, np.nan)
     for start in range(0, cloud.rows, BLOCK):
         part = slice(start, start + BLOCK)
         ids = labels[part]
-        block = np.empty(len(ids), dtype)
-        for name, (new, _) in kept.items():
-            block[new] = columns[name][part]
-        block["cylinder_id"] = ids
-        block["residual"] = np.where(ids < 0, np.nan, residuals[part])
-        for name, values in zip(("red", "green", "blue"), cylinder_colors(ids).T, strict=True):
-            block[name] = values
-        yield block
+        colors = cylinder_colors(ids).T
+        found = {"cylinder_id": ids, "residual": np.where(ids < 0, np.nan, residuals[part])}
+        yield part, found | dict(zip(("red", "green", "blue"), colors, strict=True))
+
+
+def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> None:
+    """Write LAS or LAZ, by way of an unnamed file where the output has no positions."""
+    from cylx.io.las_annotated import write_las  # noqa: PLC0415
+
+    header, table = extraction.cloud.source.header, extraction.cloud.table
+    if header is None or table is None:
+        raise ValueError("only clouds from LAS and LAZ can be written as such")
+    if file.seekable():
+        write_las(file, header, table, _findings(extraction), compressed=compressed)
+        return
+    with tempfile.TemporaryFile() as copy:
+        write_las(copy, header, table, _findings(extraction), compressed=compressed)
+        copy.seek(0)
+        shutil.copyfileobj(copy, file)

@@ -8,32 +8,33 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from cylx.errors import InputError, OutputError, UsageError
+from cylx.io.formats import FORMATS, LAS_SUFFIXES, TEXT_SUFFIXES, cloud_name, cloud_suffix, recognise
 from cylx.io.inputs import Input, open_input, printable
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.outputs import open_output
+from cylx.io.packed import unpacked
 from cylx.io.pcd import read_pcd, write_pcd
 from cylx.io.ply import BLOCK, ply_type, read_ply, write_ply
-from cylx.io.xyz import SUFFIXES as TEXT_SUFFIXES
 from cylx.io.xyz import read_xyz, write_xyz
-from cylx.records import PointCloud, Source
+from cylx.records import PointCloud, Selection, Source
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
+    from collections.abc import Iterator, Mapping
 
     from numpy.typing import NDArray
 
-_READERS: dict[str, Callable[[Input], NDArray[np.void]]] = {"ply": read_ply, "pcd": read_pcd, "xyz": read_xyz}
 
-
-def read_cloud(path: str | Path, *, format: str | None = None) -> PointCloud:  # noqa: A002  the word
+def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None = None) -> PointCloud:  # noqa: A002
     """Read a point cloud with all properties of its points.
 
     Parameters
     ----------
     path : str or Path
-        A PLY, PCD or text file, or `-` for standard input.
-    format : {"ply", "pcd", "xyz"}, optional
-        What it is; by default the suffix says so, and where it does not, the content.
+        A PLY, PCD, text, LAS, LAZ, E57, NPY or NPZ file, packed by gzip or not, or `-` for standard input.
+    format : {"ply", "pcd", "xyz", "las", "e57", "npy"}, optional
+        What it is; by default the suffix says so, and where it does not, the content. LAZ is `las`, NPZ is `npy`.
+    scan : int, optional
+        The scan of an E57 file to read, the first is 0; by default all.
 
     Returns
     -------
@@ -43,19 +44,24 @@ def read_cloud(path: str | Path, *, format: str | None = None) -> PointCloud:  #
     Raises
     ------
     InputError
-        If the file cannot be read, is damaged, or has no finite point.
+        If the file cannot be read, is damaged, has no finite point or not that scan, or needs a library that is not
+        installed.
     UsageError
         If `format` is none of those above.
     """
-    if format is not None and format not in _READERS:
-        raise UsageError("format", f"unknown format {format!r}", f"use one of {', '.join(_READERS)}")
-    with open_input(path) as source:
-        kind = format or _recognise(source, Path(path).suffix.lower())
+    if format is not None and format not in FORMATS:
+        raise UsageError("format", f"unknown format {format!r}", f"use one of {', '.join(FORMATS)}")
+    packed = cloud_name(path) != str(path)
+    with open_input(path) as file, unpacked(file, packed=packed) as source:
+        kind = format or recognise(source, cloud_suffix(path))
+        if scan is not None and kind != "e57":
+            raise InputError(source.place, "is no E57 file, of which a scan could be chosen", "leave --scan out")
         try:
-            table = _READERS[kind](source)
+            table, header = _read(source, kind, scan)
         except MemoryError:
             raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
-        return _cloud(table, source.place, Source(_file_name(path), kind, source.sha256))
+        origin = Source(_file_name(path), kind, source.sha256, Selection(scan=scan), header)
+        return _cloud(table, source.place, origin)
 
 
 def recorded_name(path: str | Path) -> str:
@@ -64,8 +70,8 @@ def recorded_name(path: str | Path) -> str:
 
 
 def cloud_suffixes() -> tuple[str, ...]:
-    """Give the suffixes of the files that are taken for clouds in a folder, in small letters."""
-    return (".ply", ".pcd", *TEXT_SUFFIXES)
+    """Give the small suffixes of the files that are taken for clouds in a folder; arrays may be anything."""
+    return (".ply", ".pcd", *TEXT_SUFFIXES, *LAS_SUFFIXES, ".e57")
 
 
 def write_cloud(
@@ -116,17 +122,22 @@ def _file_name(path: str | Path) -> str:
     return str(path).encode("utf-8", "replace").decode()
 
 
-def _recognise(source: Input, suffix: str) -> str:
-    if suffix in (".ply", ".pcd"):
-        return suffix[1:]
-    head = source.head(1024).lstrip()
-    if head.startswith((b"ply\n", b"ply\r")):
-        return "ply"
-    if head.startswith((b"# .PCD", b"#.PCD", b"VERSION", b"FIELDS")):
-        return "pcd"
-    if suffix not in TEXT_SUFFIXES and b"\0" in head:
-        raise InputError(source.place, "is neither PLY nor PCD nor text", "convert it to PLY")
-    return "xyz"
+def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], bytes | None]:
+    """Read the table of a file, and what a LAS file has besides; readers that few need are imported late."""
+    if kind == "las":
+        from cylx.io.las import read_las  # noqa: PLC0415
+        from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415
+
+        return read_las(source), kept_header(source, las_header(source))
+    if kind == "e57":
+        from cylx.io.e57 import read_e57  # noqa: PLC0415
+
+        return read_e57(source, scan), None
+    if kind == "npy":
+        from cylx.io.npy import read_npy  # noqa: PLC0415
+
+        return read_npy(source), None
+    return {"ply": read_ply, "pcd": read_pcd, "xyz": read_xyz}[kind](source), None
 
 
 def _cloud(table: NDArray[np.void], place: str, source: Source) -> PointCloud:

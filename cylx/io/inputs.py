@@ -36,12 +36,15 @@ class Input:
         Bytes in it.
     sha256 : str
         Digest of these bytes.
+    path : Path or None
+        Its name; None if it has none, or another than its content.
     """
 
     place: str
     file: BinaryIO
     size: int
     sha256: str
+    path: Path | None = None
 
     def head(self, size: int) -> bytes:
         """Give up to `size` bytes from the beginning."""
@@ -62,7 +65,7 @@ def open_input(path: str | Path) -> Iterator[Input]:
     with _open(path, place) as stream:
         try:
             if str(path) != "-" and stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                yield Input(place, stream, *_measure(stream, place))
+                yield Input(place, stream, *_measure(stream, place), path=Path(path))
                 return
             with tempfile.TemporaryFile() as copy:
                 yield Input(place, copy, *_measure(stream, place, copy))

@@ -4,16 +4,18 @@ Many things of one kind travel as a structure of arrays (`Candidates`); the few 
 one. All records are frozen: a stage makes new ones and never changes those it was given.
 """
 
-from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, Source, cell_keys
+from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, cell_keys
 from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
 from cylx.records.octaves import CELL, Explained, Octave
 from cylx.records.outcomes import CylinderFit, Extraction, Finding, NominalRadius, Refusal, Rejection, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
+from cylx.records.sources import Crop, Selection, Source
 
 __all__ = [
     "CELL",
     "Candidates",
     "Cluster",
+    "Crop",
     "CylinderFit",
     "EllipseFit",
     "Explained",
@@ -30,6 +32,7 @@ __all__ = [
     "Rejection",
     "Scene",
     "Segment",
+    "Selection",
     "SilentObserver",
     "Slice",
     "Source",

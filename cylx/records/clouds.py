@@ -13,39 +13,21 @@ from numpy.typing import ArrayLike, NDArray
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
 from cylx.geometry.sorting import sort_in_place
+from cylx.records.sources import ARRAY, Source
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 MaskArray = NDArray[np.bool_]
 
 
-@dataclass(frozen=True, slots=True)
-class Source:
-    """Where a cloud came from.
-
-    Parameters
-    ----------
-    file : str
-        The name as the user gave it, `-` for standard input, `<array>` for an array.
-    format : str
-        `ply`, `pcd`, `xyz` or `array`.
-    sha256 : str or None
-        Digest of the bytes read; None for an array.
-    """
-
-    file: str
-    format: str
-    sha256: str | None = None
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class PointCloud:
-    """The finite points of a file, and the file's whole table beside them.
+    """The points of a file that take part, and the file's whole table beside them.
 
     Parameters
     ----------
     points : ndarray of shape (N, 3), float64
-        The finite points, in scene units, in the order of the file. Made read-only.
+        The points, all finite, in scene units, in the order of the file. Made read-only.
     table : ndarray of shape (rows,), structured, or None
         Every property of every row as read, rows without finite coordinates included; None if there is nothing but
         `points`.
@@ -58,7 +40,7 @@ class PointCloud:
     points: FloatArray
     table: NDArray[np.void] | None = None
     valid: MaskArray | None = None
-    source: Source = Source("<array>", "array")
+    source: Source = ARRAY
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64, order="C")
@@ -95,14 +77,14 @@ class PointCloud:
         return len(self.points) if self.valid is None else len(self.valid)
 
     def spread(self, values: NDArray[Any], fill: object) -> NDArray[Any]:
-        """Lay values of the finite points out over the rows of the file.
+        """Lay values of the points out over the rows of the file.
 
         Parameters
         ----------
         values : ndarray of shape (N,)
-            One value a finite point.
+            One value a point.
         fill : object
-            The value of rows without finite coordinates.
+            The value of the other rows.
 
         Returns
         -------

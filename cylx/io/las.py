@@ -1,0 +1,161 @@
+"""LAS and LAZ: all dimensions of all points, read by laspy piece by piece."""
+
+from __future__ import annotations
+
+import logging
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cylx.errors import InputError
+from cylx.io.extras import require_extra
+from cylx.io.las_header import LasFacts, las_header
+from cylx.io.names import mended_names
+from cylx.io.rows import short_of_points
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    from cylx.io.inputs import Input
+
+_CHUNK = 1 << 19  # points read at a time
+_REMEDY = "get a complete copy of the file"
+
+
+@dataclass(frozen=True, slots=True)
+class Dimension:
+    """A column of the table: its name there, its type, and the dimension, and element of it, that it comes from."""
+
+    name: str
+    type: np.dtype[Any]
+    dimension: str
+    element: int | None = None
+
+    def of(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Give the column's part of the values of its dimension."""
+        return values if self.element is None else values[:, self.element]
+
+
+def read_las(source: Input) -> NDArray[np.void]:
+    """Read all points of a LAS or LAZ file.
+
+    Parameters
+    ----------
+    source : Input
+
+    Returns
+    -------
+    ndarray of shape (points,), structured
+        `x`, `y` and `z` in float64, scale and offset applied, and all other dimensions, those in extra bytes too; a
+        dimension `d` of several values as `d_0`, `d_1` and so on.
+
+    Raises
+    ------
+    InputError
+        If this is no LAS, it is damaged or shorter than its header says, or laspy or lazrs is not installed.
+    """
+    facts = las_header(source)
+    require_extra("laz" if facts.compressed else "las", source.place)
+    with quiet_laspy(), _told_apart(source.place):
+        return _read(source, facts)
+
+
+def las_dimensions(point_format: Any) -> list[Dimension]:  # noqa: ANN401  (of laspy)
+    """Say which columns the points of a format have besides x, y and z, in the order of the file."""
+    found = []
+    for one in point_format.dimensions:
+        if one.name in ("X", "Y", "Z"):
+            continue
+        kind = np.dtype("f8") if one.is_scaled else (one.dtype or np.dtype("u1")).base  # bits have no type
+        elements = range(one.num_elements) if one.num_elements > 1 and one.dtype is not None else [None]
+        found += [(one.name if e is None else f"{one.name}_{e}", kind, one.name, e) for e in elements]
+    names = mended_names(["x", "y", "z", *(name for name, *_ in found)])[3:]
+    return [Dimension(name, *rest) for name, (_, *rest) in zip(names, found, strict=True)]
+
+
+@contextmanager
+def quiet_laspy() -> Iterator[None]:
+    """Keep laspy from telling on standard error what it raises besides, or what is found out here."""
+    logger = logging.getLogger("laspy")
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
+    import laspy  # noqa: PLC0415
+
+    source.file.seek(0)
+    if facts.compressed:
+        _check_chunks(source, facts, laspy.LasHeader.read_from(source.file))
+        source.file.seek(0)
+    with laspy.open(source.file, closefd=False, read_evlrs=False) as reader:
+        header = reader.header
+        columns = las_dimensions(header.point_format)
+        types = [*((axis, np.dtype("f8")) for axis in "xyz"), *((one.name, one.type) for one in columns)]
+        table = np.empty(facts.points, np.dtype(types))
+        done = 0
+        for chunk in reader.chunk_iterator(_CHUNK):
+            part = table[done : done + len(chunk)]
+            done += len(chunk)
+            for axis, scale, offset in zip("xyz", header.scales, header.offsets, strict=True):
+                part[axis] = chunk[axis.upper()] * np.float64(scale) + np.float64(offset)
+            for one in columns:
+                part[one.name] = one.of(np.asarray(chunk[one.dimension]))
+    if done < facts.points:
+        raise short_of_points(source.place, facts.points, done)
+    return table
+
+
+def _check_chunks(source: Input, facts: LasFacts, header: Any) -> None:  # noqa: ANN401  (of laspy)
+    """Check where the compressed chunks lie: lazrs takes memory for as many and as long ones as it is told of."""
+    import lazrs  # noqa: PLC0415
+
+    record = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
+    damaged = InputError(source.place, "the table of its compressed chunks is damaged", _REMEDY)
+    if record.item_size() != header.point_format.size:
+        raise damaged
+    source.file.seek(facts.start)
+    table = _whole(source)
+    if table == -1:  # it was not known when the points were written
+        source.file.seek(source.size - 8)
+        table = _whole(source)
+    if not facts.start + 8 <= table <= source.size - 8:
+        raise damaged
+    source.file.seek(table + 4)
+    count = int.from_bytes(source.file.read(4), "little")
+    size = record.chunk_size()
+    if count > (facts.points if record.uses_variable_size_chunks() else -(-facts.points // max(size, 1)) + 1):
+        raise damaged
+    source.file.seek(facts.start)
+    chunks = lazrs.read_chunk_table(source.file, record)
+    if any(length < 0 for _, length in chunks) or sum(length for _, length in chunks) > table - facts.start - 8:
+        raise damaged
+
+
+def _whole(source: Input) -> int:
+    return int.from_bytes(source.file.read(8), "little", signed=True)
+
+
+@contextmanager
+def _told_apart(place: str) -> Iterator[None]:
+    """Turn what laspy and lazrs raise on a damaged file into an error of the file."""
+    import laspy  # noqa: PLC0415
+
+    damaged: tuple[type[Exception], ...] = (laspy.errors.LaspyException, ValueError, KeyError, IndexError)
+    with suppress(ImportError):
+        import lazrs  # noqa: PLC0415
+
+        damaged += (lazrs.LazrsError,)
+    try:
+        yield
+    except damaged as error:
+        fault = " ".join(str(error).split()) or type(error).__name__
+        raise InputError(place, f"broken LAS: {fault}", _REMEDY) from None

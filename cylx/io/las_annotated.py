@@ -1,0 +1,123 @@
+"""The annotated LAS or LAZ: the file as it came, and the cylinder of each point in extra bytes."""
+
+from __future__ import annotations
+
+import io
+from datetime import date
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from cylx.io.las import las_dimensions, quiet_laspy
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from numpy.typing import NDArray
+
+_OURS = {"cylinder_id": "i4", "residual": "f4"}
+_COLORS = ("red", "green", "blue")
+_FULL = 257  # colours of LAS have 16 bits
+_NO_DATE = date(1970, 1, 1)
+
+
+def write_las(
+    file: BinaryIO,
+    kept: bytes,
+    table: NDArray[np.void],
+    blocks: Iterable[tuple[slice, dict[str, NDArray[Any]]]],
+    *,
+    compressed: bool,
+) -> None:
+    """Write the points of a LAS file again, with the cylinder of each.
+
+    The point format stays, and so do version, scales, offsets and the small records, such as that of the coordinate
+    system. Extra bytes with our names, and colours that are not all 0, are kept as `orig_red` and so on.
+
+    Parameters
+    ----------
+    file : binary file
+        One that can be read from any position.
+    kept : bytes
+        What the file had besides its points.
+    table : ndarray of shape (points,), structured
+        Its points, as they were read.
+    blocks : iterable of (slice, mapping)
+        `cylinder_id`, `residual`, `red`, `green` and `blue` of the points, piece by piece.
+    compressed : bool
+        Whether to write LAZ.
+    """
+    import laspy  # noqa: PLC0415
+
+    with quiet_laspy():
+        header = laspy.LasHeader.read_from(io.BytesIO(kept), read_evlrs=True)
+        columns = las_dimensions(header.point_format)
+        renamed = _prepare(header, table)
+        with laspy.open(file, mode="w", header=header, closefd=False, do_compress=compressed) as writer:
+            for part, ours in blocks:
+                rows = table[part]
+                record = laspy.ScaleAwarePointRecord.zeros(len(rows), header=header)
+                for axis, scale, offset in zip("xyz", header.scales, header.offsets, strict=True):
+                    record[axis.upper()] = np.rint((rows[axis] - offset) / scale).astype("i4")
+                for one in columns:
+                    _put(record, renamed.get(one.dimension, one.dimension), one.element, rows[one.name])
+                for color in _COLORS if _is_colored(header) else ():
+                    if f"{color}+" in renamed:
+                        record[renamed[f"{color}+"]] = rows[color]
+                    record[color] = ours[color].astype("u2") * _FULL
+                for name in _OURS:
+                    record[name] = ours[name]
+                writer.write_points(record)
+            if header.evlrs:
+                writer.write_evlrs(header.evlrs)
+
+
+def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: ANN401  (of laspy)
+    """Make room for our dimensions in a header; gives the new names of dimensions, of colours under `red+`."""
+    import laspy  # noqa: PLC0415
+
+    point_format = header.point_format
+    taken = [*point_format.dimension_names, *_OURS]
+    renamed = {}
+    for place, one in enumerate(point_format.dimensions):
+        if one.name in _OURS:
+            renamed[one.name] = _new_name(one.name, taken)
+            point_format.dimensions[place] = one._replace(name=renamed[one.name])
+    params = [laspy.ExtraBytesParams(name, kind) for name, kind in _OURS.items()]
+    if _is_colored(header) and any(table[color].any() for color in _COLORS):
+        renamed |= {f"{color}+": _new_name(color, taken) for color in _COLORS}
+        params += [laspy.ExtraBytesParams(renamed[f"{color}+"], "u2") for color in _COLORS]
+    header.add_extra_dims(params)
+    header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]
+    header.creation_date = header.creation_date or _NO_DATE  # laspy would say today
+    header.start_of_waveform_data_packet_record = 0
+    header.global_encoding.waveform_data_packets_internal = False
+    return renamed
+
+
+def _is_colored(header: Any) -> bool:  # noqa: ANN401  (of laspy)
+    return "red" in header.point_format.standard_dimension_names
+
+
+def _new_name(name: str, taken: list[str]) -> str:
+    """Give the name to keep a property under, of at most 32 letters, which LAS allows."""
+    new, count = f"orig_{name}", 1
+    while new in taken:
+        count += 1
+        new = f"orig_{name}_{count}"
+    taken.append(new)
+    return new
+
+
+def _put(record: Any, name: str, element: int | None, values: NDArray[Any]) -> None:  # noqa: ANN401  (of laspy)
+    """Put a column of the table where it was in the file."""
+    about = record.point_format.dimension_by_name(name)
+    if about.is_scaled:
+        place = element or 0
+        values = np.rint((values - about.offsets[place]) / about.scales[place]).astype(about.dtype.base)
+    if element is not None:
+        record.array[name][:, element] = values
+    elif about.is_scaled:
+        record.array[name] = values
+    else:
+        record[name] = values

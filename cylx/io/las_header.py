@@ -1,0 +1,116 @@
+"""The header of a LAS file, checked against itself and against the size of the file before laspy reads it."""
+
+from __future__ import annotations
+
+import math
+import struct
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cylx.errors import InputError
+from cylx.io.rows import short_of_points
+
+if TYPE_CHECKING:
+    from cylx.io.inputs import Input
+
+_LEAST = 227  # bytes of a header before version 1.3
+_WITH_COUNT = 375  # bytes of one of version 1.4, whose counts have eight
+_LAST_FORMAT = 10
+_VLR, _EVLR = 54, 60  # bytes before the data of each
+_LARGEST_EVLR = 1 << 20
+_MOST_STEPS = 2.0**31  # of a scale, from the offset
+_REMEDY = "get a complete copy of the file"
+
+
+@dataclass(frozen=True, slots=True)
+class LasFacts:
+    """What a header says.
+
+    Parameters
+    ----------
+    points : int
+        How many points there are.
+    compressed : bool
+        Whether they are compressed, as in LAZ.
+    start : int
+        The byte at which they begin.
+    evlrs : tuple of int
+        The byte at which the records after them begin, and their number.
+    """
+
+    points: int
+    compressed: bool
+    start: int
+    evlrs: tuple[int, int]
+
+
+def las_header(source: Input) -> LasFacts:
+    """Read the header of a LAS and check it.
+
+    Raises
+    ------
+    InputError
+        If this is no LAS, holds no points, contradicts itself, or is shorter than its header says.
+    """
+    place, head = source.place, source.head(_WITH_COUNT)
+    if head[:4] != b"LASF":
+        raise InputError(place, "is no LAS: it does not begin with LASF", "give it its right suffix")
+    if len(head) < _LEAST:
+        raise InputError(place, "the file ends within the LAS header", _REMEDY)
+    minor = head[25]
+    size, start, vlrs = struct.unpack_from("<HII", head, 94)
+    kind, width, points = struct.unpack_from("<BHI", head, 104)
+    evlrs = (0, 0)
+    if minor >= 4:
+        if len(head) < _WITH_COUNT:
+            raise InputError(place, "the file ends within the LAS header", _REMEDY)
+        evlrs = struct.unpack_from("<QI", head, 235)
+        points = struct.unpack_from("<Q", head, 247)[0]
+    if head[24] != 1 or kind & 0x3F > _LAST_FORMAT:
+        fault = f"LAS {head[24]}.{minor} with point format {kind & 0x3F} is not known"
+        raise InputError(place, fault, "export the file again as LAS 1.2 or 1.4")
+    if start > source.size:
+        raise InputError(place, "the file ends within the LAS header", _REMEDY)
+    if size + _VLR * vlrs > start:
+        raise InputError(place, f"the LAS header has no room for its {vlrs} records", _REMEDY)
+    if points == 0:
+        raise InputError(place, "holds no points", "give a file with points")
+    _check_scales(head, place)
+    compressed = kind & 0xC0 == 0x80
+    if not compressed and (held := (source.size - start) // max(width, 1)) < points:
+        raise short_of_points(place, points, held)
+    return LasFacts(points, compressed, start, evlrs)
+
+
+def kept_header(source: Input, facts: LasFacts) -> bytes:
+    """Give what a LAS file has besides its points, so that it can be written again with others.
+
+    That is the header and all records before the points, and of those after them the small ones: neither waveforms nor
+    the index of a COPC file, which would be wrong afterwards.
+    """
+    source.file.seek(0)
+    head = bytearray(source.file.read(facts.start))
+    kept, tail = 0, bytearray()
+    place, count = facts.evlrs
+    for _ in range(count):
+        if place + _EVLR > source.size:
+            break
+        source.file.seek(place)
+        record = source.file.read(_EVLR)
+        length = struct.unpack_from("<Q", record, 20)[0]
+        if length <= _LARGEST_EVLR and place + _EVLR + length <= source.size and record[2:6] != b"copc":
+            kept += 1
+            tail += record + source.file.read(length)
+        place += _EVLR + length
+    if head[25] >= 4:
+        struct.pack_into("<QI", head, 235, facts.start if kept else 0, kept)
+    return bytes(head + tail)
+
+
+def _check_scales(head: bytes, place: str) -> None:
+    scales, offsets = struct.unpack_from("<3d", head, 131), struct.unpack_from("<3d", head, 155)
+    for axis, scale, offset in zip("xyz", scales, offsets, strict=True):
+        if scale == 0.0 or not math.isfinite(scale * _MOST_STEPS):
+            raise InputError(place, f"the scale of {axis} is {scale:g}", "export the file again")
+        if not math.isfinite(abs(offset) + abs(scale) * _MOST_STEPS):
+            raise InputError(place, f"the offset of {axis} is {offset:g}", "export the file again")

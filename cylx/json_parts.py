@@ -1,0 +1,116 @@
+"""What the JSON files have in common: the cloud that was looked at, kinds of numbers, and how they are written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+if TYPE_CHECKING:
+    from cylx.records import Extraction, Selection
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Length = Annotated[Number, Field(ge=0)]
+Count = Annotated[int, Field(ge=0)]
+Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
+Corner = Annotated[list[Number | None], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Annotated[list[Number], Field(min_length=5, max_length=5)]], Field(min_length=5, max_length=5)]
+
+
+class Part(BaseModel):
+    """A part of the result: unknown keys, wrong types and numbers that are not finite are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+
+
+class Bounds(Part):
+    """The smallest box along the coordinate axes that holds all points that took part."""
+
+    min: Vector
+    """Smallest coordinates, scene units."""
+    max: Vector
+    """Largest coordinates, scene units."""
+
+
+class Crop(Part):
+    """A box along the coordinate axes; `null` stands for no bound."""
+
+    min: Corner
+    """Smallest coordinates, scene units."""
+    max: Corner
+    """Largest coordinates, scene units."""
+
+
+class Input(Part):
+    """The cloud that was looked at."""
+
+    file: str
+    """Name of the file without its folder; `-` for standard input, `<array>` for an array."""
+    format: str
+    """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `array`."""
+    points: Count
+    """Number of points, those without finite coordinates and those that took no part included."""
+    sha256: str | None = None
+    """Digest of the bytes read; absent for an array."""
+    scan: Count | None = None
+    """The scan of several that was read, the first is 0; absent if all were."""
+    crop: Crop | None = None
+    """Only points in this box took part; absent if there was none."""
+    classes: list[Count] | None = None
+    """Only points of these classes took part; absent if all did."""
+    every: Annotated[int, Field(ge=1)] | None = None
+    """Only the first of so many rows took part; absent if all did."""
+    voxel: Annotated[Number, Field(gt=0)] | None = None
+    """Only one point took part in each cell of this side, scene units; absent if all did."""
+    bounds: Bounds
+    """Bounding box of the points that took part."""
+
+    @staticmethod
+    def keys_of(selection: Selection) -> dict[str, Any]:
+        """Write down which points took part."""
+        corners = None if selection.crop is None else [list(corner) for corner in selection.crop]
+        return {
+            "scan": selection.scan,
+            "crop": None if corners is None else Crop(min=corners[0], max=corners[1]),
+            "classes": None if selection.classes is None else list(selection.classes),
+            "every": selection.every,
+            "voxel": selection.voxel,
+        }
+
+    def is_of(self, selection: Selection) -> bool:
+        """Say whether these points took part, and no others."""
+        return all(getattr(self, name) == value for name, value in self.keys_of(selection).items())
+
+    @classmethod
+    def of(cls, extraction: Extraction) -> Input:
+        """Write down what was looked at."""
+        cloud = extraction.cloud
+        name = cloud.source.file if cloud.source.format == "array" else Path(cloud.source.file).name
+        return cls(
+            file=name.encode("utf-8", "backslashreplace").decode("utf-8"),
+            format=cloud.source.format,
+            points=cloud.rows,
+            sha256=cloud.source.sha256,
+            **cls.keys_of(cloud.source.selection),
+            bounds=Bounds(min=plain_numbers(cloud.points.min(axis=0)), max=plain_numbers(cloud.points.max(axis=0))),
+        )
+
+
+def drop_missing(parts: Iterable[dict[str, Any]]) -> None:
+    """Take what was not computed out of parts of a JSON object."""
+    for part in parts:
+        for key in [key for key, value in part.items() if value is None]:
+            del part[key]
+
+
+def plain_numbers(vector: Iterable[float]) -> list[float]:
+    """Turn a vector into plain floats, without negative zeros."""
+    return [float(x) + 0.0 for x in vector]
+
+
+def text_of(content: Mapping[str, Any]) -> str:
+    """Give the text of a JSON file, with a newline at its end."""
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

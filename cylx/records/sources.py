@@ -1,0 +1,92 @@
+"""Where a cloud came from, and which of its points take part."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+Corner = tuple[float | None, float | None, float | None]
+Crop = tuple[Corner, Corner]
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Which points take part; None stands for all of them.
+
+    Parameters
+    ----------
+    crop : pair of triples of float or None
+        The smallest and the largest coordinates, scene units; None sets no bound.
+    voxel : float or None
+        Side of cells of which one point each takes part, scene units.
+    every : int or None
+        Of the rows of the file, the first of so many takes part.
+    classes : tuple of int or None
+        Classes of the points, ascending.
+    scan : int or None
+        The scan of a file of several, the first is 0; the others are not read.
+    """
+
+    crop: Crop | None = None
+    voxel: float | None = None
+    every: int | None = None
+    classes: tuple[int, ...] | None = None
+    scan: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.crop is not None:
+            _check_crop(self.crop)
+        if self.voxel is not None and not 0 < self.voxel < math.inf:
+            raise ValueError(f"voxel must be > 0 and finite, not {self.voxel}")
+        if self.every is not None and self.every < 1:
+            raise ValueError(f"every must be at least 1, not {self.every}")
+        if self.scan is not None and self.scan < 0:
+            raise ValueError(f"scan must be at least 0, not {self.scan}")
+        if self.classes is not None:
+            if not self.classes or min(self.classes) < 0:
+                raise ValueError(f"classes must be one or several numbers from 0, not {self.classes}")
+            object.__setattr__(self, "classes", tuple(sorted(set(self.classes))))
+
+    @property
+    def narrows(self) -> bool:
+        """Whether points that were read are left out."""
+        return any(one is not None for one in (self.crop, self.voxel, self.every, self.classes))
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """Where a cloud came from.
+
+    Parameters
+    ----------
+    file : str
+        The name as the user gave it, `-` for standard input, `<array>` for an array.
+    format : str
+        `ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `array`.
+    sha256 : str or None
+        Digest of the bytes read; None for an array.
+    selection : Selection
+        Which of its points take part.
+    header : bytes or None
+        What a LAS file has besides its points, so that it can be written again.
+    """
+
+    file: str
+    format: str
+    sha256: str | None = None
+    selection: Selection = Selection()
+    header: bytes | None = None
+
+
+ARRAY = Source("<array>", "array")
+"""The source of a cloud that comes from no file."""
+
+
+def _check_crop(crop: Crop) -> None:
+    if len(crop) != 2 or any(len(corner) != 3 for corner in crop):
+        raise ValueError(f"crop must be two corners of three coordinates, not {crop}")
+    for axis, low, high in zip("xyz", *crop, strict=True):
+        if any(side is not None and not math.isfinite(side) for side in (low, high)):
+            raise ValueError(f"crop must be finite in {axis}; None sets no bound")
+        if low is not None and high is not None and low > high:
+            raise ValueError(f"crop has its smallest {axis}, {low:g}, above its largest, {high:g}")
