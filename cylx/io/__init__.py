@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cylx.io.annotated import cylinder_colors as cylinder_colors
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.clouds import read_cloud as read_cloud
     from cylx.io.clouds import write_cloud as write_cloud
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "check_writable": "cylx.io.outputs",
-    "cylinder_colors": "cylx.io.annotated",
     "read_cloud": "cylx.io.clouds",
     "read_json": "cylx.io.inputs",
     "read_object": "cylx.io.meshes",
