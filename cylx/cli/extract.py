@@ -48,6 +48,18 @@ if TYPE_CHECKING:
     shell_complete=complete_files,
     help="Write what was not accepted, and why, as JSON; - for standard output, or a folder.",
 )
+@click.option(
+    "--report",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Write a page for the browser: the cloud and its cylinders in 3-D; - for standard output, or a folder.",
+)
+@click.option(
+    "--png",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Write a picture of the cloud and its cylinders; - for standard output, or a folder. Needs matplotlib.",
+)
 @configured
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
 @click.option(
@@ -69,6 +81,8 @@ def extract(
     annotate: bool | None,
     annotated: str | None,
     rejected: str | None,
+    report: str | None,
+    png: str | None,
     settings: Config,
     threads: int | None,
     require: int | None,
@@ -82,10 +96,14 @@ def extract(
     cylinders, and scan.annotated.ply, the cloud with the cylinder of each point. Nothing has to be tuned: spacing,
     noise and radii are read off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
     """
-    jobs = plan_jobs(scans, output, annotate, annotated, rejected)
+    jobs = plan_jobs(scans, output, annotate, annotated, rejected, report, png)
     extras = [] if profile is None else [profile]
     check_apart(scans, [*(name for job in jobs for name in job.outputs), *extras])
     check_outputs(jobs, extras, overwrite=overwrite)
+    if png is not None:
+        from cylx.report import check_pictures
+
+        check_pictures()
     run = Run(settings, threads, require, overwrite, talk)
     try:
         run.extract_all(jobs)

@@ -322,7 +322,7 @@ function start() {
 
 /** Use the page as somebody would, and tell what came of it. */
 function selftest() {
-  const told = { rows: byId("rows").children.length, title: document.title, webgl: viewer !== null };
+  const told = { ready: performance.now(), rows: byId("rows").children.length, title: document.title, webgl: viewer !== null };
   sortBy(1);
   sortBy(1);
   told.radii = [...byId("rows").children].map((row) => cylinders[rows.indexOf(row)].radius);
@@ -353,10 +353,13 @@ function tryView() {
   viewer.camera.target = view.home.center;
   recolor("residual");
   recolor("cylinder");
-  const begun = performance.now();
-  viewer.draw();
-  told.lit = litPixels(viewer.gl);
-  told.milliseconds = performance.now() - begun;
+  const times = [1, 2, 3].map(() => {
+    const begun = performance.now();
+    viewer.draw();
+    told.lit = litPixels(viewer.gl);
+    return performance.now() - begun;
+  });
+  told.milliseconds = Math.min(...times);
   return told;
 }
 

@@ -63,13 +63,13 @@ def png_of(extraction: Extraction) -> bytes:
 
     canvas = Figure(figsize=INCHES, dpi=DPI)
     FigureCanvasAgg(canvas)
-    axes: Any = canvas.add_axes((0.02, 0.03, 0.94, 0.9), projection="3d", elev=ELEVATION, azim=AZIMUTH)
+    axes: Any = canvas.add_axes((0.02, 0.02, 0.94, 0.92), projection="3d", elev=ELEVATION, azim=AZIMUTH)
     chosen = choose_points(extraction.labels, MOST_POINTS, np.random.default_rng(extraction.config.seed))
     points, labels = extraction.cloud.points[chosen], extraction.labels[chosen]
     low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
     shown = ((points >= low) & (points <= high)).all(axis=1) | (labels >= 0)
-    colors = np.column_stack([cylinder_colors(labels[shown]) / 255.0, np.where(labels[shown] < 0, 0.25, 0.7)])
-    axes.scatter(*points[shown].T, c=colors, s=1.2, marker=".", linewidths=0, depthshade=False, rasterized=True)
+    colors = np.column_stack([cylinder_colors(labels[shown]) / 255.0, np.where(labels[shown] < 0, 0.5, 0.9)])
+    axes.scatter(*points[shown].T, c=colors, s=2.5, marker=".", linewidths=0, depthshade=False, rasterized=True)
     for number, fit in enumerate(extraction.cylinders):
         color = cylinder_colors(np.array([number]))[0] / 255.0 * 0.6
         for line in outline(fit.cylinder):
@@ -113,7 +113,7 @@ def _frame(axes: Any, points: NDArray[np.float64]) -> None:  # noqa: ANN401  (it
         getattr(axes, f"set_{axis}label")(axis)
         axes.tick_params(axis=axis, labelsize=8)
         getattr(axes, f"{axis}axis").get_major_locator().set_params(nbins=5)
-    axes.set_box_aspect(size, zoom=1.05)
+    axes.set_box_aspect(size, zoom=1.15)
 
 
 def _printable(name: str) -> str:
