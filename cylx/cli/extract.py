@@ -93,8 +93,9 @@ def extract(
     """Find the cylinders of one or several scans.
 
     SCAN is a PLY, PCD or XYZ file, or - for standard input. For scan.ply this writes scan.cylinders.json, the
-    cylinders, and scan.annotated.ply, the cloud with the cylinder of each point. Nothing has to be tuned: spacing,
-    noise and radii are read off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
+    cylinders, and scan.annotated.ply, the cloud with the cylinder of each point; with --report FILE a page to look at,
+    too. Nothing has to be tuned: spacing, noise and radii are read off the cloud, in whatever unit it comes. A table of
+    what was found goes to standard error.
     """
     jobs = plan_jobs(scans, output, annotate, annotated, rejected, report, png)
     extras = [] if profile is None else [profile]

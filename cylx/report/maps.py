@@ -28,8 +28,8 @@ class ResidualMap:
     reach : float
         Largest of them, scene units.
     limit : float
-        The residual at the end of the colour scale, scene units: that of all but the most extreme cells, and no less
-        than the noise.
+        The residual at the end of the colour scale, scene units: that of all but the most extreme cells with more than
+        two points, and no less than twice the noise, so that mere noise is pale.
     zero : str
         The coordinate axis that the angle 0 is turned to.
     """
@@ -70,7 +70,8 @@ def unroll(points: FloatArray, residuals: FloatArray, cylinder: Cylinder, noise:
     means = np.divide(sums, counts, out=np.zeros(len(sums)), where=counts > 0)
     sizes = np.abs(means[counts > 0])
     reach = float(sizes.max(initial=0.0)) or 1.0
-    limit = max(float(np.quantile(sizes, 0.98)) if len(sizes) else 0.0, noise) or 1.0
+    sure = sizes[counts[counts > 0] > 2]
+    limit = max(float(np.quantile(sure, 0.98)) if len(sure) else 0.0, 2.0 * noise) or reach
     packed = np.where(counts > 0, np.rint(means / reach * 127), EMPTY).astype(np.int8)
     return ResidualMap(packed.reshape(rows, columns), reach, limit, zero)
 

@@ -177,7 +177,7 @@ function mapFigure(one) {
     if (cell !== -128) image.data.set([...diverging(cell / 127 * reach / limit), 255], place);
   });
   context.putImageData(image, 0, 0);
-  const told = make("output", {}, `${columns} × ${count} cells, angle from ${zero}, start below`);
+  const told = make("output", {}, `0° is towards ${zero}, the start below`);
   canvas.addEventListener("pointermove", (event) => {
     const [x, y] = [event.offsetX / canvas.clientWidth, event.offsetY / canvas.clientHeight];
     const [column, row] = [Math.floor(x * columns), count - 1 - Math.floor(y * count)];

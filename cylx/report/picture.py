@@ -113,7 +113,7 @@ def _frame(axes: Any, points: NDArray[np.float64]) -> None:  # noqa: ANN401  (it
         getattr(axes, f"set_{axis}label")(axis)
         axes.tick_params(axis=axis, labelsize=8)
         getattr(axes, f"{axis}axis").get_major_locator().set_params(nbins=5)
-    axes.set_box_aspect(size, zoom=1.15)
+    axes.set_box_aspect(size, zoom=1.08)
 
 
 def _printable(name: str) -> str:

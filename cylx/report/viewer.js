@@ -62,12 +62,12 @@ function meeting(eye, ray, start, end, radius) {
 
 const POINT_VERTEX = `
 attribute vec3 place; attribute vec4 color;
-uniform mat4 matrix; uniform vec3 size; uniform float dotSize, pixels, least;
+uniform mat4 matrix; uniform vec3 size; uniform vec2 depth; uniform float dotSize, pixels, least;
 varying vec3 shade;
 void main() {
   gl_Position = color.a == 0.0 ? vec4(2.0, 2.0, 2.0, 1.0) : matrix * vec4((place - 0.5) * size, 1.0);
   gl_PointSize = clamp(dotSize * pixels / gl_Position.w, least, 30.0);
-  shade = color.rgb;
+  shade = color.rgb * mix(1.0, 0.45, clamp((gl_Position.w - depth.x) / depth.y, 0.0, 1.0));
 }`;
 const POINT_FRAGMENT = `
 precision mediump float;
@@ -137,7 +137,7 @@ const BACKGROUND = [0.07, 0.085, 0.11];
 const OTHERS = [128, 128, 128];
 const HOME_ANGLES = { yaw: -Math.PI / 3, pitch: 0.45 };
 const TANGENT = Math.tan(Math.PI / 8); // of half the angle of view
-const ROOM = 0.85; // the ball that is looked at first is larger than what is in it
+const ROOM = 1.02; // the ball that is looked at first is larger than what is in it
 const SLOW = 70; // milliseconds a frame, from which on fewer points are drawn while something moves
 
 class Viewer {
@@ -339,7 +339,10 @@ class Viewer {
     gl.disable(gl.BLEND);
     gl.uniformMatrix4fv(names.matrix, false, matrix);
     gl.uniform3fv(names.size, this.view.size);
-    gl.uniform1f(names.dotSize, this.view.spacing * this.shown.dot);
+    const { radius } = this.view.home; // what is far is darker; colours that mean a number are as they are
+    const length = this.shown.coloring === "residual" ? Infinity : 2 * radius;
+    gl.uniform2f(names.depth, Math.max(0, this.camera.distance - radius), Math.min(length, 1e30));
+    gl.uniform1f(names.dotSize, this.view.spacing * 0.7 * this.shown.dot);
     gl.uniform1f(names.pixels, this.canvas.height / (2 * this.tangent()));
     gl.uniform1f(names.least, 1.5 * ratio * Math.sqrt(this.shown.dot));
     gl.bindBuffer(gl.ARRAY_BUFFER, this.placeBuffer);
