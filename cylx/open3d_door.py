@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import os
+import sys
 import tempfile
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +29,10 @@ VIEWPOINT 0 0 0 1 0 0 0
 POINTS {points}
 DATA binary_compressed
 """
+
+
+class NoDisplayError(Exception):
+    """There is nothing to open a window on."""
 
 
 def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
@@ -119,3 +126,94 @@ def estimate_normals(points: NDArray[np.float64], neighbours: int) -> NDArray[np
     nearest = open3d.geometry.KDTreeSearchParamKNN(knn=neighbours)
     cloud.estimate_normals(nearest, fast_normal_computation=False)
     return np.array(cloud.normals)
+
+
+def show_scene(
+    points: NDArray[np.float64],
+    colors: NDArray[np.uint8],
+    cylinders: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]],
+    tints: NDArray[np.uint8],
+    title: str,
+) -> None:
+    """Open a window with a cloud and cylinders, until the user closes it.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+    colors : ndarray of shape (N, 3), uint8
+    cylinders : sequence of tuple
+        Start and end of the axis, and the radius, of each.
+    tints : ndarray of shape (number of cylinders, 3), uint8
+        Their colours.
+    title : str
+        Of the window.
+
+    Raises
+    ------
+    NoDisplayError
+        If there is no display.
+    ImportError
+        If open3d is not installed, or does not run here.
+    """
+    if not _has_display():
+        raise NoDisplayError
+    open3d = import_open3d()
+    middle = points.mean(axis=0) if len(points) else np.zeros(3)  # what is drawn is drawn in single precision
+    cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points - middle))
+    cloud.colors = open3d.utility.Vector3dVector(colors / 255.0)
+    meshes = [
+        _tube(open3d, start - middle, end - middle, radius, tint / 255.0)
+        for (start, end, radius), tint in zip(cylinders, tints, strict=True)
+    ]
+    with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
+        window = open3d.visualization.Visualizer()
+        if not window.create_window(window_name=title, width=1280, height=900):
+            raise NoDisplayError
+        for one in (cloud, *meshes):
+            window.add_geometry(one)
+        window.get_render_option().mesh_show_back_face = True
+        window.run()
+        window.destroy_window()
+
+
+def _has_display() -> bool:
+    """Say whether a window would be seen; open3d opens one in memory, and waits for ever, where there is no display."""
+    if not sys.platform.startswith("linux") or os.environ.get("WAYLAND_DISPLAY"):
+        return True
+    if not os.environ.get("DISPLAY"):
+        return False
+    try:
+        library = ctypes.CDLL("libX11.so.6")
+    except OSError:
+        return False
+    library.XOpenDisplay.restype = ctypes.c_void_p
+    library.XCloseDisplay.argtypes = [ctypes.c_void_p]
+    display = library.XOpenDisplay(None)
+    if display is not None:
+        library.XCloseDisplay(display)
+    return display is not None
+
+
+def _tube(
+    open3d: Any,  # noqa: ANN401  (it has no types)
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    radius: float,
+    tint: NDArray[np.float64],
+) -> Any:  # noqa: ANN401
+    """Make a tube without caps, as a mesh."""
+    axis = end - start
+    direction = axis / (np.linalg.norm(axis) or 1.0)
+    across = np.cross(direction, np.eye(3)[np.abs(direction).argmin()])
+    across /= np.linalg.norm(across) or 1.0
+    angles = np.linspace(0, 2 * np.pi, 48, endpoint=False)
+    ring = radius * (np.outer(np.cos(angles), across) + np.outer(np.sin(angles), np.cross(direction, across)))
+    here, then = np.arange(48), (np.arange(48) + 1) % 48
+    triangles = np.vstack([np.column_stack([here, then, here + 48]), np.column_stack([then, then + 48, here + 48])])
+    mesh = open3d.geometry.TriangleMesh(
+        open3d.utility.Vector3dVector(np.vstack([start + ring, end + ring])),
+        open3d.utility.Vector3iVector(triangles.astype(np.int32)),
+    )
+    mesh.compute_vertex_normals()
+    mesh.paint_uniform_color(tint)
+    return mesh

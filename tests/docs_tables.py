@@ -222,12 +222,18 @@ def rejected_format():
 
 # --- the house
 
+COMMENTS = {".js": r"^// (.*)$", ".css": r"^/\* (.*) \*/$", ".html": r"^<!-- (.*) -->$"}
+TOLD = {".py", ".yaml", *COMMENTS}
+"""Kinds of files that say what they are for."""
+
 
 def purpose(path):
     """Give the first line of what a file says of itself."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".yaml":
         return text.splitlines()[0].lstrip("# ")
+    if path.suffix in COMMENTS:
+        return re.search(COMMENTS[path.suffix], text, re.MULTILINE)[1]
     return (ast.get_docstring(ast.parse(text)) or "").split("\n")[0]
 
 
@@ -238,7 +244,7 @@ def rooms():
         PACKAGE,
         *sorted(path for path in PACKAGE.rglob("*") if path.is_dir() and path.name != "__pycache__"),
     ]:
-        files = sorted(path for path in folder.iterdir() if path.suffix in {".py", ".yaml"} and path.stat().st_size)
+        files = sorted(path for path in folder.iterdir() if path.suffix in TOLD and path.stat().st_size)
         parts.append(f"`{folder.relative_to(PACKAGE.parent).as_posix()}/`\n")
         parts += [f"- `{path.name}`: {purpose(path)}" for path in files]
         parts.append("")

@@ -15,7 +15,7 @@ from cylx.cli.group import LazyGroup
 from cylx.cli.options import debug_option
 from cylx.errors import BatchError, ConfigError, InputError, NothingFoundError, OutputError, UsageError
 
-COMMANDS = ["extract", "info", "config", "synth", "evaluate", "diff"]
+COMMANDS = ["extract", "view", "info", "config", "synth", "evaluate", "diff", "reproduce"]
 LEAVES = [
     *(["extract"], ["info"], ["evaluate"], ["diff"]),
     *(["config", name] for name in ("init", "show", "check", "schema")),

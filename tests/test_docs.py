@@ -7,7 +7,7 @@ import re
 
 import click
 import pytest
-from docs_tables import PACKAGE, TABLES, commands, config_keys, config_sections, options_of
+from docs_tables import PACKAGE, TABLES, TOLD, commands, config_keys, config_sections, options_of
 
 from cylx import errors, evidence
 from cylx.config import Config
@@ -259,7 +259,7 @@ def test_the_function_of_an_equation_is_there_and_names_it(equation, name):
 def test_every_file_of_the_package_is_on_the_page_of_the_design():
     rooms = read("docs/design.md").partition("<!-- begin rooms -->")[2].partition("<!-- end rooms -->")[0]
     told = [path for block in rooms.split("\n\n`") for path in files_of(block)]
-    there = [path for path in PACKAGE.rglob("*") if path.suffix in {".py", ".yaml"} and path.stat().st_size]
+    there = [path for path in PACKAGE.rglob("*") if path.suffix in TOLD and path.stat().st_size]
     assert sorted(told) == sorted(path.relative_to(ROOT).as_posix() for path in there)
     assert all(re.findall(r"^- `.*`: \S.*$", rooms, re.MULTILINE))
     assert not re.findall(r"^- `.*`: *$", rooms, re.MULTILINE)

@@ -10,7 +10,8 @@ import pytest
 from plyfile import PlyData, PlyElement
 
 from cylx.errors import OutputError
-from cylx.io import cylinder_colors, read_cloud, write_annotated, write_cloud
+from cylx.io import read_cloud, write_annotated, write_cloud
+from cylx.palette import cylinder_colors
 from cylx.records import PointCloud
 
 GREY = [128, 128, 128]

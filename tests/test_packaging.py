@@ -24,7 +24,11 @@ def test_there_is_one_version():
     assert newest.group(1) == cylx.__version__
 
 
-@pytest.mark.parametrize("name", ["py.typed", "presets/auto.yaml", "presets/paper.yaml"])
+DATA = ["py.typed", "presets/auto.yaml", "presets/paper.yaml"]
+DATA += [f"report/{name}" for name in ("page.html", "panels.js", "viewer.css", "viewer.js")]
+
+
+@pytest.mark.parametrize("name", DATA)
 def test_the_package_has_its_data(name):
     assert files("cylx").joinpath(name).is_file()
 

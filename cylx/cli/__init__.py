@@ -16,6 +16,7 @@ from cylx.cli.options import debug_option
     cls=LazyGroup,
     homes={
         "extract": "cylx.cli.extract",
+        "view": "cylx.cli.view",
         "info": "cylx.cli.info",
         "config": "cylx.cli.config",
         "synth": "cylx.cli.synth",

@@ -51,6 +51,18 @@ if TYPE_CHECKING:
     shell_complete=complete_files,
     help="Write what was not accepted, and why, as JSON; - for standard output, or a folder.",
 )
+@click.option(
+    "--report",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Write a page for the browser: the cloud and its cylinders in 3-D; - for standard output, or a folder.",
+)
+@click.option(
+    "--png",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Write a picture of the cloud and its cylinders; - for standard output, or a folder. Needs matplotlib.",
+)
 @configured
 @selecting
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
@@ -74,6 +86,8 @@ def extract(
     annotate: bool | None,
     annotated: str | None,
     rejected: str | None,
+    report: str | None,
+    png: str | None,
     settings: Config,
     selection: Selection,
     threads: int | None,
@@ -87,15 +101,15 @@ def extract(
 
     SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, a folder of them, a pattern in quotes, or - for standard input.
     For scan.ply this writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of
-    each point. Nothing has to be tuned: spacing, noise and radii are read off the cloud, in whatever unit it comes. A
-    table of what was found goes to standard error.
+    each point; with --report FILE a page to look at, too. Nothing has to be tuned: spacing, noise and radii are read
+    off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
     """
     from cylx.cli.batch import Batch
     from cylx.cli.scans import find_scans
 
     output = many.output(output)
     found = find_scans(scans, recursive=many.recursive)
-    jobs = plan_jobs(found, output, annotate, annotated, rejected)
+    jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png)
     summaries, extras = many.summaries(output, found), [] if profile is None else [profile]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])
     run = Run(settings, threads, require, overwrite or many.resume, talk, selection)
@@ -104,6 +118,10 @@ def extract(
         check_outputs(jobs, [], overwrite=overwrite or many.resume)
         check_outputs([], extras, overwrite=overwrite)
         batch.check(overwrite=overwrite)
+        if png is not None:
+            from cylx.report import check_pictures
+
+            check_pictures()
         try:
             batch.go()
         finally:

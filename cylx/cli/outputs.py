@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from cylx.records import Extraction, PointCloud
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
+REPORT, PICTURE = ".report.html", ".cylinders.png"
 STREAM = "-"
 
 
@@ -32,17 +33,24 @@ class Job:
         The annotated cloud, `-` for standard output, None for none.
     rejected : str or None
         The JSON of what was not accepted, `-` for standard output, None for none.
+    report : str or None
+        The page to look at, `-` for standard output, None for none.
+    picture : str or None
+        The PNG, `-` for standard output, None for none.
     """
 
     scan: str
     result: str
     annotated: str | None
     rejected: str | None = None
+    report: str | None = None
+    picture: str | None = None
 
     @property
     def outputs(self) -> list[str]:
         """What it writes."""
-        return [name for name in (self.result, self.annotated, self.rejected) if name is not None]
+        names = (self.result, self.annotated, self.rejected, self.report, self.picture)
+        return [name for name in names if name is not None]
 
 
 def plan_jobs(
@@ -51,13 +59,15 @@ def plan_jobs(
     annotate: bool | None,
     annotated: str | None,
     rejected: str | None = None,
+    report: str | None = None,
+    picture: str | None = None,
 ) -> list[Job]:
     """Name the outputs of every scan.
 
-    They lie beside the scan, or where `-o` says: a file for one scan, a folder for one or several. The
-    annotated PLY lies beside the JSON; what was not accepted is written only where `--rejected` says. What comes from
-    standard input goes to standard output, unless `-o` says otherwise, and what goes to standard output goes there
-    alone, unless an annotated PLY is asked for.
+    They lie beside the scan, or where `-o` says: a file for one scan, a folder for one or several. The annotated cloud
+    lies beside the JSON; what was not accepted, the report and the picture are written only where `--rejected`,
+    `--report` and `--png` say. What comes from standard input goes to standard output, unless `-o` says otherwise, and
+    what goes to standard output goes there alone, unless an annotated cloud is asked for.
 
     Parameters
     ----------
@@ -71,19 +81,27 @@ def plan_jobs(
         `--annotated`.
     rejected : str or None
         `--rejected`.
+    report : str or None
+        `--report`.
+    picture : str or None
+        `--png`.
 
     Raises
     ------
     UsageError
         If two outputs, or an output and an input, are the same file, or an output has no name.
     """
-    names = (output, annotated, rejected)
-    output, annotated, rejected = (STREAM if name == "/dev/stdout" else name for name in names)
+    names = (output, annotated, rejected, report, picture)
+    output, annotated, rejected, report, picture = (STREAM if name == "/dev/stdout" else name for name in names)
     if len(scans) > 1:
-        _check_batch(scans, output, annotated, rejected)
+        _check_batch(scans, output, annotated, {"--rejected": rejected, "--report": report, "--png": picture})
     jobs = [_plan(scan, output, annotate, annotated) for scan in scans]
     if rejected is not None:
         jobs = [replace(job, rejected=_inside(rejected, job.scan, REJECTED)) for job in jobs]
+    if report is not None:
+        jobs = [replace(job, report=_inside(report, job.scan, REPORT)) for job in jobs]
+    if picture is not None:
+        jobs = [replace(job, picture=_inside(picture, job.scan, PICTURE)) for job in jobs]
     _check_twins(jobs)
     check_apart(scans, [name for job in jobs for name in job.outputs])
     return jobs
@@ -145,18 +163,19 @@ def check_format(job: Job, cloud: PointCloud) -> None:
 
 
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
-    """Write the JSON, the annotated PLY and what was not accepted of one scan, all or nothing.
+    """Write the JSON, and what else was asked for of one scan, all or nothing.
 
     Raises
     ------
     OutputError
         If one of them cannot be written.
     """
-    from cylx.io import write_annotated, write_text
+    from cylx.io import write_annotated, write_bytes, write_text
     from cylx.rejections import Rejections
     from cylx.results import Result
 
     text = Result.of(extraction).to_json()
+    page, picture = _looks(job, extraction)
     with contextlib.ExitStack() as stack:
 
         def staged(name: str) -> str | Path:
@@ -168,7 +187,21 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
             write_annotated(staged(job.annotated), extraction, overwrite=overwrite)
         if job.rejected is not None:
             write_text(staged(job.rejected), Rejections.of(extraction).to_json(), overwrite=overwrite)
+        if job.report is not None:
+            write_text(staged(job.report), page, overwrite=overwrite)
+        if job.picture is not None:
+            write_bytes(staged(job.picture), picture, overwrite=overwrite)
         write_text(result, text, overwrite=overwrite)
+
+
+def _looks(job: Job, extraction: Extraction) -> tuple[str, bytes]:
+    """Make the report and the picture of a scan, if they are asked for."""
+    if job.report is None and job.picture is None:
+        return "", b""
+    from cylx.report import html_of, png_of
+
+    page = "" if job.report is None else html_of(extraction)
+    return page, b"" if job.picture is None else png_of(extraction)
 
 
 def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str | None) -> Job:
@@ -222,18 +255,22 @@ def is_slashed(output: str) -> bool:
     return output.endswith(("/", os.sep))
 
 
-def _check_batch(scans: Sequence[str], output: str | None, annotated: str | None, rejected: str | None) -> None:
-    """Refuse what works for one scan only."""
+def _check_batch(
+    scans: Sequence[str], output: str | None, annotated: str | None, folders: Mapping[str, str | None]
+) -> None:
+    """Refuse what works for one scan only; `folders` are options that name a folder for several."""
     if STREAM in scans:
         raise UsageError("-", "standard input is one of several inputs", "give it alone")
     if annotated is not None:
         raise UsageError("--annotated", "names one file for several inputs", "leave it out, or give one input")
     if output is not None and (output == STREAM or Path(output).is_file()):
         raise UsageError(f"-o {output}", "is one file for several inputs", "give a folder, or one input")
-    if rejected is not None and not is_folder(rejected):
-        raise UsageError(f"--rejected {rejected}", "is one file for several inputs", "give a folder, or one input")
-    for name, made in ((output, output is not None and is_slashed(output)), (rejected, False)):
-        if name is not None and not made and not Path(name).is_dir():
+    for option, name in folders.items():
+        if name is not None and not is_folder(name):
+            raise UsageError(f"{option} {name}", "is one file for several inputs", "give a folder, or one input")
+    made = output is not None and is_slashed(output)
+    for name in (None if made else output, *folders.values()):
+        if name is not None and not Path(name).is_dir():
             raise OutputError(name, "no such folder", "create it first")
 
 

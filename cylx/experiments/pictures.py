@@ -1,4 +1,4 @@
-"""Figures as pictures; the only place that imports matplotlib."""
+"""Figures as pictures."""
 
 from __future__ import annotations
 

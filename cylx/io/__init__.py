@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from cylx.io.annotated import check_annotated as check_annotated
-    from cylx.io.annotated import cylinder_colors as cylinder_colors
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
@@ -37,7 +36,6 @@ _HOMES = {
     "cloud_name": "cylx.io.formats",
     "cloud_suffix": "cylx.io.formats",
     "cloud_suffixes": "cylx.io.clouds",
-    "cylinder_colors": "cylx.io.annotated",
     "expected_points": "cylx.io.sizes",
     "printable": "cylx.io.inputs",
     "read_cloud": "cylx.io.clouds",

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import colorsys
 import shutil
 import tempfile
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -18,6 +16,7 @@ from cylx.io.names import mended_names
 from cylx.io.outputs import open_output
 from cylx.io.pcd import write_pcd
 from cylx.io.ply import BLOCK, ply_type, write_ply
+from cylx.palette import cylinder_colors
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -27,8 +26,6 @@ if TYPE_CHECKING:
     from cylx.records import Extraction, PointCloud
 
 _OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "blue": "u1"}
-_GREY = 128
-_GOLDEN = 0.6180339887498949
 
 
 def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool = False) -> None:
@@ -97,32 +94,6 @@ def check_annotated(path: str | Path, cloud: PointCloud) -> None:
         if lists:
             fault = f"PCD cannot hold the list property {excerpt(lists[0])}"
             raise OutputError(printable(path), fault, "choose a name that ends in .ply")
-
-
-def cylinder_colors(ids: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
-    """Give each cylinder a colour of its own, which depends on its id alone; grey for -1.
-
-    Parameters
-    ----------
-    ids : ndarray of shape (N,)
-        Ids of cylinders, -1 for none.
-
-    Returns
-    -------
-    ndarray of shape (N, 3), uint8
-        Red, green and blue.
-    """
-    colors = [_color(number) for number in range(int(ids.max(initial=-1)) + 1)]
-    palette = np.array([*colors, (_GREY,) * 3], dtype=np.uint8)
-    return palette.take(ids, axis=0)  # -1 is the last
-
-
-@cache
-def _color(number: int) -> tuple[int, ...]:
-    """Go round the hues in golden steps, which keep neighbours apart, in six shades by turns."""
-    saturation = (0.85, 0.55, 1.0)[number % 3]
-    value = (0.95, 0.7)[number % 2]
-    return tuple(round(255 * part) for part in colorsys.hsv_to_rgb(number * _GOLDEN % 1.0, saturation, value))
 
 
 def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:

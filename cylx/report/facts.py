@@ -1,0 +1,132 @@
+"""What a report says, as one JSON object: the result, its points in few bytes, and the map of each cylinder."""
+
+from __future__ import annotations
+
+import base64
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.config_text import plain_yaml
+from cylx.json_parts import drop_missing
+from cylx.palette import cylinder_colors
+from cylx.rejections import RejectedCylinder
+from cylx.report.maps import unroll
+from cylx.report.points import choose_points, original_colors, pack_labels, pack_residuals, quantise
+from cylx.results import Result
+
+if TYPE_CHECKING:
+    from cylx.records import Extraction
+
+MOST_POINTS = 500_000
+MOST_REJECTED = 50
+NOISES = 8.0
+"""Residuals are told apart up to so many noises."""
+_OUTLYING = 0.005  # share of the points at either end of a coordinate that the first look need not show
+
+
+def facts_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str, Any]:
+    """Gather what a report says.
+
+    Parameters
+    ----------
+    extraction : Extraction
+    most_points : int
+        Most points shown.
+
+    Returns
+    -------
+    dict
+        A JSON object: `result`, as in the result file but for the configuration, which is the text `config`; `fields`,
+        the properties of the input; the first `rejected`, of `rejected_count`; `view`, what is drawn; `maps`, the
+        unrolled surface of each cylinder.
+    """
+    result = Result.of(extraction).to_object()
+    del result["config"]
+    table = extraction.cloud.table
+    rejected = [RejectedCylinder.of(one).model_dump(mode="json") for one in extraction.rejected[:MOST_REJECTED]]
+    drop_missing(rejected)
+    return {
+        "result": result,
+        "config": plain_yaml(extraction.config),
+        "fields": ["x", "y", "z"] if table is None else list(table.dtype.names or ()),
+        "rejected": rejected,
+        "rejected_count": len(extraction.rejected),
+        "view": _view(extraction, most_points),
+        "maps": _maps(extraction),
+    }
+
+
+def _view(extraction: Extraction, most_points: int) -> dict[str, Any]:
+    """Give what is drawn: points, and cylinders relative to the middle of the box."""
+    cloud, fits = extraction.cloud, extraction.cylinders
+    chosen = choose_points(extraction.labels, most_points, np.random.default_rng(extraction.config.seed))
+    points = cloud.points[chosen]
+    steps, low, size = quantise(points)
+    middle = low + 0.5 * size
+    unit = _unit(extraction)
+    labels = pack_labels(extraction.labels[chosen], len(fits))
+    colors = original_colors(cloud)
+    shapes = [[*(fit.cylinder.start - middle), *(fit.cylinder.end - middle), fit.cylinder.radius] for fit in fits]
+    return {
+        "count": len(chosen),
+        "total": len(cloud.points),
+        "low": low.tolist(),
+        "size": size.tolist(),
+        "home": _home(points - middle, np.array(shapes).reshape(-1, 7)),
+        "spacing": float(extraction.scene.spacing) * float(np.sqrt(len(cloud.points) / len(chosen))),
+        "noise": unit,
+        "noises": NOISES,
+        "points": _packed(steps),
+        "labels": _packed(labels),
+        "label_bytes": labels.itemsize,
+        "residuals": _packed(pack_residuals(extraction.residuals[chosen].astype(np.float64), NOISES * unit)),
+        "colors": None if colors is None else _packed(colors[chosen]),
+        "palette": _packed(cylinder_colors(np.arange(len(fits)))),
+        "cylinders": np.array(shapes).tolist(),
+    }
+
+
+def _unit(extraction: Extraction) -> float:
+    """Give the noise, or what stands for it where the points have none."""
+    residuals = extraction.residuals[np.isfinite(extraction.residuals)].astype(np.float64)
+    scatter = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else 0.0
+    return float(extraction.scene.noise) or scatter or 1.0
+
+
+def _home(points: NDArray[np.float64], shapes: NDArray[np.float64]) -> dict[str, Any]:
+    """Give the ball that is looked at first: of all but the most outlying points, and of all cylinders."""
+    low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
+    for ends in (shapes[:, :3], shapes[:, 3:6]):
+        low = np.minimum(low, (ends - shapes[:, 6:]).min(axis=0, initial=np.inf))
+        high = np.maximum(high, (ends + shapes[:, 6:]).max(axis=0, initial=-np.inf))
+    return {"center": (0.5 * (low + high)).tolist(), "radius": float(np.linalg.norm(high - low) / 2) or 1.0}
+
+
+def _maps(extraction: Extraction) -> list[dict[str, Any]]:
+    """Unroll every cylinder, with all of its points."""
+    order = np.argsort(extraction.labels, kind="stable")
+    ends = np.searchsorted(extraction.labels[order], np.arange(len(extraction.cylinders) + 1))
+    maps = []
+    for number, fit in enumerate(extraction.cylinders):
+        own = order[ends[number] : ends[number + 1]]
+        residuals = extraction.residuals[own].astype(np.float64)
+        found = unroll(extraction.cloud.points[own], residuals, fit.cylinder, float(extraction.scene.noise))
+        rows, columns = found.means.shape
+        maps.append(
+            {
+                "columns": columns,
+                "rows": rows,
+                "reach": found.reach,
+                "limit": found.limit,
+                "zero": found.zero,
+                "means": _packed(found.means),
+            }
+        )
+    return maps
+
+
+def _packed(values: NDArray[Any]) -> str:
+    """Write the bytes of an array as base64, row after row."""
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

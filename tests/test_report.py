@@ -1,0 +1,343 @@
+"""The report: what it says, what it shows, that no name can break out of it, and that a browser opens it."""
+
+import base64
+import dataclasses
+import html
+import json
+import re
+import shutil
+import struct
+import subprocess
+
+import numpy as np
+import pytest
+
+from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.palette import cylinder_colors
+from cylx.records import PointCloud, Source
+from cylx.report import html_of, png_of
+from cylx.report.facts import facts_of
+from cylx.report.maps import EMPTY, unroll
+from cylx.report.page import json_for_script
+from cylx.report.picture import outline
+from cylx.report.points import LEAST, STEPS, choose_points, original_colors, pack_labels, pack_residuals, quantise
+from cylx.results import Result
+
+HOSTILE = "</script><img src=x onerror=alert(1)>&lt;\u2028\"'{{script}}.ply"
+
+
+def unpacked(text, dtype):
+    return np.frombuffer(base64.b64decode(text), dtype)
+
+
+def blob_of(page):
+    (blob,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', page, re.DOTALL)
+    return json.loads(blob)
+
+
+@pytest.fixture
+def extraction(make_extraction):
+    return make_extraction()
+
+
+@pytest.fixture
+def hostile(make_extraction):
+    """An extraction whose file, properties, warnings and reasons all try to get out of the page."""
+    points = make_extraction().cloud.points
+    table = np.zeros(len(points), [(name, "f8") for name in ("x", "y", "z", HOSTILE)])
+    for place, axis in enumerate("xyz"):
+        table[axis] = points[:, place]
+    made = make_extraction(PointCloud(points, table, source=Source(f"{HOSTILE.replace('/', '')}", "ply", "0" * 64)))
+    refused = [dataclasses.replace(one, reason=HOSTILE) for one in made.rejected]
+    stages = [dataclasses.replace(one, name=HOSTILE, rejected={HOSTILE: 2}) for one in made.stages]
+    fits = [dataclasses.replace(fit, evidence={HOSTILE: 1.0}) for fit in made.cylinders]
+    return dataclasses.replace(
+        made, warnings=(HOSTILE,), rejected=tuple(refused), stages=tuple(stages), cylinders=tuple(fits)
+    )
+
+
+# what it says
+
+
+def test_the_object_in_the_page_agrees_with_the_result(extraction):
+    facts = blob_of(html_of(extraction))
+    result = Result.of(extraction).to_object()
+    config = result.pop("config")
+    assert facts["result"] == result
+    assert f"seed: {config['seed']}" in facts["config"].splitlines()
+    assert (facts["fields"], facts["rejected_count"]) == (["x", "y", "z"], 1)
+    assert [one["reason"] for one in facts["rejected"]] == ["agreement"]
+    view = facts["view"]
+    assert (view["count"], view["total"], len(view["cylinders"]), len(facts["maps"])) == (24, 24, 2, 2)
+    middle = np.array(view["low"]) + 0.5 * np.array(view["size"])
+    fit = extraction.cylinders[1].cylinder
+    assert view["cylinders"][1] == pytest.approx([*(fit.start - middle), *(fit.end - middle), 2.0])
+    assert np.array_equal(unpacked(view["palette"], "u1").reshape(-1, 3), cylinder_colors(np.arange(2)))
+
+
+def test_the_points_in_the_page_are_those_of_the_cloud(extraction):
+    view = facts_of(extraction)["view"]
+    steps = unpacked(view["points"], "<u2").reshape(-1, 3)
+    points = np.array(view["low"]) + steps / STEPS * np.array(view["size"])
+    expected = extraction.cloud.points[np.lexsort(extraction.cloud.points.T)]
+    assert points[np.lexsort(np.round(points, 4).T)] == pytest.approx(expected, abs=4.0 / STEPS)
+    assert set(unpacked(view["labels"], "u1")) == {0}
+    assert set(unpacked(view["residuals"], "i1")) == {0}
+
+
+def test_a_result_without_a_cylinder_has_a_page(make_extraction):
+    facts = blob_of(html_of(make_extraction(cylinders=0, rejected=0)))
+    assert (facts["result"]["cylinders"], facts["maps"], facts["rejected"]) == ([], [], [])
+    assert set(unpacked(facts["view"]["labels"], "u1")) == {255}
+    assert set(unpacked(facts["view"]["residuals"], "i1")) == {-128}
+
+
+def test_of_many_refused_ones_the_first_are_told_of(make_extraction):
+    facts = facts_of(make_extraction(rejected=70))
+    assert (len(facts["rejected"]), facts["rejected_count"]) == (50, 70)
+
+
+def test_the_same_result_gives_the_same_bytes(make_extraction):
+    assert html_of(make_extraction()) == html_of(make_extraction())
+    assert png_of(make_extraction()) == png_of(make_extraction())
+
+
+# what it shows
+
+
+def test_coordinates_are_off_by_half_a_step_at_most():
+    points = np.random.default_rng(3).normal(size=(5000, 3)) * [100, 1, 1e-3] + [4e6, -5e5, 0]
+    steps, low, size = quantise(points)
+    assert (steps.dtype, steps.min(), steps.max()) == (np.dtype("<u2"), 0, STEPS)
+    assert (np.abs(low + steps / STEPS * size - points) <= size / STEPS * 0.5001 + 1e-9).all()
+
+
+def test_a_flat_cloud_has_a_box_without_thickness():
+    steps, _, size = quantise(np.array([[0.0, 1, 2], [1, 1, 2]]))
+    assert size.tolist() == [1, 0, 0]
+    assert steps.tolist() == [[0, 0, 0], [STEPS, 0, 0]]
+
+
+def test_few_points_are_all_shown():
+    labels = np.array([0, -1, 1], np.int32)
+    assert sorted(choose_points(labels, 3, np.random.default_rng(0))) == [0, 1, 2]
+
+
+def test_many_points_are_chosen_evenly_and_every_cylinder_keeps_some():
+    labels = np.repeat(np.array([-1, 0, 1, 2], np.int32), [800_000, 190_000, 9_970, 30])
+    chosen = choose_points(labels, 50_000, np.random.default_rng(7))
+    assert 49_990 < len(chosen) <= 50_000
+    assert len(np.unique(chosen)) == len(chosen)
+    counts = np.bincount(labels[chosen] + 1)
+    assert counts[3] == 30
+    assert counts[2] >= LEAST
+    assert counts[:2] / counts.sum() == pytest.approx([0.8, 0.19], abs=0.02)
+    others = np.sort(chosen[labels[chosen] == -1])
+    assert np.diff(others).max() < 2.1 * 800_000 / len(others)  # no stretch of the order is left out
+    assert np.mean(chosen[:5000]) == pytest.approx(np.mean(chosen), rel=0.03)  # any beginning is an even choice
+    again = choose_points(labels, 50_000, np.random.default_rng(7))
+    assert np.array_equal(chosen, again)
+
+
+def test_as_many_cylinders_as_points_may_be_shown_are_no_mistake():
+    labels = np.arange(300, dtype=np.int32) % 100
+    chosen = choose_points(labels, 100, np.random.default_rng(0))
+    assert 0 < len(chosen) <= 100
+
+
+def test_labels_take_two_bytes_where_one_is_not_enough():
+    labels = np.array([-1, 0, 254], np.int32)
+    assert pack_labels(labels, 255).tolist() == [255, 0, 254]
+    assert pack_labels(labels, 256).tolist() == [65535, 0, 254]
+    assert pack_labels(labels, 256).dtype == np.dtype("<u2")
+
+
+def test_residuals_are_steps_of_their_limit():
+    assert pack_residuals(np.array([np.nan, 0, 1, -1, 9, -0.5]), 1.0).tolist() == [-128, 0, 127, -127, 127, -64]
+
+
+def rgb(*columns):
+    return dict(zip(("red", "green", "blue"), columns, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("columns", "expected"),
+    [
+        (rgb(np.uint8([1, 2]), np.uint8([3, 4]), np.uint8([5, 6])), [[1, 3, 5], [2, 4, 6]]),
+        (rgb(np.uint16([257, 0]), np.uint16([0, 0]), np.uint16([65535, 0])), [[1, 0, 255], [0, 0, 0]]),
+        (rgb(np.float32([1, 0]), np.float32([0.5, 0]), np.float32([0, np.nan])), [[255, 128, 0], [0, 0, 0]]),
+        ({"rgb": np.uint32([0x010203, 0xFF0000]).view(np.float32)}, [[1, 2, 3], [255, 0, 0]]),
+        ({"intensity": np.float32([1, 2])}, None),
+        ({"red": np.uint8([1, 2])}, None),
+    ],
+)
+def test_the_colours_of_the_input_are_understood(columns, expected):
+    table = np.zeros(3, [(name, "f8") for name in "xyz"] + [(name, values.dtype) for name, values in columns.items()])
+    for name, values in columns.items():
+        table[name][[0, 2]] = values
+    valid = np.array([True, False, True])
+    colors = original_colors(PointCloud(np.zeros((2, 3)), table, valid))
+    assert (colors if colors is None else colors.tolist()) == expected
+
+
+# the map of a cylinder
+
+
+def dented(depth=0.01, noise=0.001, count=40_000):
+    """A slanted pipe of radius 0.5 and height 4, dented between 60° and 120° from its frame in its upper quarter."""
+    rng = np.random.default_rng(5)
+    pipe = Cylinder((10, 20, 30), (0.3, -0.2, 0.93), 0.5, 4.0)
+    across, along = axis_frame(pipe.direction)
+    angles, heights = rng.uniform(-np.pi, np.pi, count), rng.uniform(-2, 2, count)
+    inside = (np.abs(np.degrees(angles) - 90) < 30) & (heights > 1)
+    residuals = rng.normal(0, noise, count) - depth * inside
+    radii = 0.5 + residuals
+    rings = (radii * np.cos(angles))[:, None] * across + (radii * np.sin(angles))[:, None] * along
+    return pipe, pipe.point + heights[:, None] * pipe.direction + rings, residuals, (across, along)
+
+
+def test_a_dent_is_where_it_is_in_the_map():
+    pipe, points, residuals, (across, along) = dented()
+    found = unroll(points, residuals, pipe, noise=0.001)
+    rows, columns = found.means.shape
+    assert (found.means > EMPTY).all()
+    means = found.means / 127 * found.reach
+    zero = np.degrees(np.arctan2(along[0], across[0]))  # it stands: angle 0 is turned to x
+    assert found.zero == "x"
+    angles = (np.arange(columns) + 0.5) * 360 / columns - 180 + zero
+    away = np.abs((angles - 90 + 180) % 360 - 180)
+    levels = (np.arange(rows) + 0.5) / rows
+    edge, step = 360 / columns, 1 / rows
+    dent = (away[None, :] < 30 - edge) & (levels[:, None] > 0.75 + step)
+    rest = (away[None, :] > 30 + edge) | (levels[:, None] < 0.75 - step)
+    assert dent.sum() > 10
+    assert means[dent] == pytest.approx(-0.01, abs=0.002)
+    assert means[rest] == pytest.approx(0, abs=0.002)
+    assert 0.008 < found.limit <= found.reach < 0.013
+
+
+def test_what_is_not_seen_is_empty_in_the_map():
+    pipe, points, residuals, (across, _) = dented(depth=0)
+    seen = (points - pipe.point) @ across > 0
+    found = unroll(points[seen], residuals[seen], pipe, noise=0.001)
+    assert np.mean(found.means[0] > EMPTY) == pytest.approx(0.5, abs=0.05)
+
+
+@pytest.mark.parametrize(("height", "count"), [(0.0, 50), (1e3, 50), (1e-6, 500), (1.0, 0), (4.0, 100_000)])
+def test_a_map_has_at_most_72_by_48_cells(height, count):
+    rng = np.random.default_rng(0)
+    angles = rng.uniform(-np.pi, np.pi, count)
+    heights = height * rng.uniform(-0.5, 0.5, count)
+    points = np.column_stack([np.cos(angles), np.sin(angles), heights])
+    found = unroll(points, rng.normal(0, 0.01, count), Cylinder((0, 0, 0), (0, 0, 1), 1.0, height), 0.01)
+    rows, columns = found.means.shape
+    assert 1 <= rows <= 48
+    assert 8 <= columns <= 72
+    assert np.isfinite([found.reach, found.limit]).all()
+    assert (found.means > EMPTY).any() == (count > 0)
+
+
+# names that want to get out
+
+
+def test_no_name_gets_out_of_the_object(hostile):
+    page = html_of(hostile)
+    assert page.count("<script") == page.count("</script>") == 2
+    assert "<img" not in page
+    assert "onerror=alert" in page  # it is there, as text
+    facts = blob_of(page)
+    assert facts["fields"][3] == facts["result"]["warnings"][0] == facts["rejected"][0]["reason"] == HOSTILE
+    assert facts["result"]["input"]["file"] == HOSTILE.replace("/", "")
+
+
+@pytest.mark.parametrize("text", ["</script>", "<!--", "]]>", "&amp;", "\u2028\u2029", "\ud800", "ü", "\\", '"'])
+def test_the_object_is_harmless_and_unchanged(text):
+    written = json_for_script({text: [text, 1.5, None]})
+    assert not set(written) & {"<", ">", "&", "\u2028", "\u2029"}
+    assert written.isascii()
+    assert json.loads(written) == {text: [text, 1.5, None]}
+
+
+def test_the_page_may_not_load_anything(extraction):
+    page = html_of(extraction)
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)[1]
+    assert policy.startswith("default-src 'none'; script-src 'sha256-")
+    assert "unsafe" not in policy
+    assert not re.findall(
+        r"https?:|//[a-z]+\.|@import|url\(|innerHTML|outerHTML|insertAdjacent|eval\(|document\.write", page
+    )
+
+
+# the picture
+
+
+def test_the_picture_is_a_png_of_its_size(hostile):
+    data = png_of(hostile)
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">II", data[16:24]) == (1200, 900)
+
+
+@pytest.mark.parametrize("name", ["$\\frac{$.ply", "a\nb\x07.ply", "日本.ply", "x" * 300])
+def test_a_picture_has_any_title(make_extraction, name):
+    points = make_extraction().cloud.points
+    assert png_of(make_extraction(PointCloud(points, source=Source(name, "ply")), cylinders=0))
+
+
+def test_the_outline_is_on_the_cylinder():
+    shape = Cylinder((1, 2, 3), (1, 1, 0), 0.5, 2.0)
+    lines = np.vstack(outline(shape))
+    offsets = lines - shape.point
+    heights = offsets @ shape.direction
+    assert np.abs(heights) == pytest.approx(1.0)
+    assert np.linalg.norm(offsets - np.outer(heights, shape.direction), axis=1) == pytest.approx(0.5)
+
+
+# in a browser
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+BROWSER = next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
+@pytest.fixture
+def browse(tmp_path):
+    """Open a page in a browser without a window; gives what it told of itself and what it complained about."""
+    if BROWSER is None:
+        pytest.skip(f"none of {', '.join(BROWSERS)} is installed")
+
+    def run(page, *options):
+        path = tmp_path / "page.html"
+        path.write_text(page, encoding="utf-8", newline="\n")
+        command = [BROWSER, "--headless=new", "--no-sandbox", f"--user-data-dir={tmp_path / 'profile'}"]
+        command += ["--disable-background-networking", "--enable-logging=stderr", "--virtual-time-budget=3000"]
+        command += ["--window-size=1280,900", *options, "--dump-dom", f"{path.as_uri()}#selftest"]
+        done = subprocess.run(command, capture_output=True, timeout=60, check=False)
+        body = re.search(r"<body[^>]*>", done.stdout.decode("utf-8", "replace"))
+        assert body, done.stderr.decode("utf-8", "replace")[-2000:]
+        told = re.search(r'data-selftest="([^"]*)"', body[0])
+        complaints = re.findall(r"CONSOLE.*", done.stderr.decode("utf-8", "replace"))
+        return json.loads(html.unescape(told[1])) if told else None, complaints
+
+    return run
+
+
+SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+def test_a_browser_shows_the_page_and_can_be_used(browse, hostile):
+    told, complaints = browse(html_of(hostile), *SOFTWARE)
+    assert complaints == []
+    assert told is not None
+    name = Result.of(hostile).input.file
+    assert told["title"].split() == f"{name}: 2 cylinders".split()
+    assert (told["rows"], told["radii"]) == (2, [2.0, 1.0])  # sorted twice by radius: descending
+    assert (told["selected"], told["heading"]) == (1, "Cylinder 1")
+    if told["webgl"]:
+        assert (told["visible"], told["without"]) == (24, 0)
+        assert told["picked"] == [0, 1]
+        assert told["lit"] > 500
+
+
+def test_without_webgl_the_rest_is_there(browse, extraction):
+    told, complaints = browse(html_of(extraction), "--disable-gpu", "--disable-3d-apis")
+    assert [line for line in complaints if "WebGL" not in line] == []
+    assert (told["webgl"], told["rows"], told["heading"]) == (False, 2, "Cylinder 1")
