@@ -66,10 +66,14 @@ def beside(result: str) -> str:
     InputError
         If there is none.
     """
+    from cylx.io import LAS_SUFFIXES
+
     stem = result.removesuffix(RESULT) if result.endswith(RESULT) else str(Path(result).with_suffix(""))
-    if result == STREAM or not Path(stem + ANNOTATED).exists():
+    names = [stem + ANNOTATED + suffix for suffix in (".ply", *LAS_SUFFIXES, ".pcd")]
+    found = next((name for name in names if result != STREAM and Path(name).exists()), None)
+    if found is None:
         raise InputError(result, "has no annotated cloud beside it", "name the cloud by --cloud FILE")
-    return stem + ANNOTATED
+    return found
 
 
 def point_colors(cloud: PointCloud, cylinders: int) -> NDArray[np.uint8]:
