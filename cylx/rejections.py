@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from pydantic import ConfigDict, Field, JsonValue
 
 from cylx import __version__
-from cylx.results import Input, Measured, Part, drop_missing, text_of
+from cylx.json_text import drop_missing, text_of
+from cylx.results import Input, Measured, Part
 
 if TYPE_CHECKING:
     from cylx.records import Extraction, Rejection

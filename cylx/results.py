@@ -6,7 +6,6 @@ input, configuration and seed give the same bytes.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from math import degrees, isfinite
 from pathlib import Path
@@ -19,6 +18,8 @@ from pydantic import BaseModel, ConfigDict, Field, JsonValue, ValidationError
 from cylx import __version__
 from cylx.config_faults import describe_fault
 from cylx.errors import InputError
+from cylx.json_text import drop_missing, text_of
+from cylx.tables import dataframe_of
 
 if TYPE_CHECKING:
     from cylx.records import CylinderFit, Extraction, StageReport
@@ -210,6 +211,12 @@ class ResultCylinder(Measured, Numbered):  # the keys of the last one come first
         match = None if fit.nominal is None else CatalogueMatch.model_validate(fit.nominal, from_attributes=True)
         return cls(id=index, **cls.keys_of(fit), catalogue=match)
 
+    def to_object(self) -> dict[str, Any]:
+        """Give the JSON object; what was not computed is left out."""
+        content = self.model_dump(mode="json")
+        drop_missing([content, content["catalogue"] or {}])
+        return content
+
 
 class Result(Part):
     """The cylinders of one cloud, how they were found, and with which settings they are found again."""
@@ -280,25 +287,16 @@ class Result(Part):
     def to_object(self) -> dict[str, Any]:
         """Give the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        drop_missing([content["input"], *content["cylinders"]])
-        drop_missing(cylinder["catalogue"] for cylinder in content["cylinders"] if "catalogue" in cylinder)
-        return content
+        drop_missing([content["input"]])
+        return content | {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
+
+    def to_dataframe(self) -> Any:  # noqa: ANN401  pandas is an extra
+        """Give the cylinders as a pandas data frame, its columns those of `cylx.tables.table_of`."""
+        return dataframe_of([cylinder.to_object() for cylinder in self.cylinders])
 
     def to_json(self) -> str:
         """Give the text of the file, with a newline at its end."""
         return text_of(self.to_object())
-
-
-def drop_missing(parts: Iterable[dict[str, Any]]) -> None:
-    """Take what was not computed out of parts of a JSON object."""
-    for part in parts:
-        for key in [key for key, value in part.items() if value is None]:
-            del part[key]
-
-
-def text_of(content: Mapping[str, Any]) -> str:
-    """Give the text of a JSON file, with a newline at its end."""
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def result_schema() -> dict[str, Any]:

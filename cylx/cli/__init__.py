@@ -21,6 +21,8 @@ from cylx.cli.options import debug_option
         "synth": "cylx.cli.synth",
         "evaluate": "cylx.cli.evaluate",
         "diff": "cylx.cli.diff",
+        "export": "cylx.cli.export",
+        "doctor": "cylx.cli.doctor",
         "reproduce": "cylx.cli.reproduce",
     },
     examples=["cylx extract scan.ply", "cylx extract scan.ply -o - | jq '.cylinders | length'"],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import secrets
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -154,6 +154,29 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
         if job.rejected is not None:
             write_text(staged(job.rejected), Rejections.of(extraction).to_json(), overwrite=overwrite)
         write_text(job.result, text, overwrite=overwrite)
+
+
+def write_together(contents: Mapping[str, bytes], *, overwrite: bool) -> None:
+    """Write several files, all or nothing.
+
+    Parameters
+    ----------
+    contents : mapping of str to bytes
+        What to write, by file; not to streams.
+    overwrite : bool
+        Whether files that exist may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If one of them cannot be written.
+    """
+    from cylx.io import write_bytes
+
+    with contextlib.ExitStack() as stack:
+        for name, data in contents.items():
+            staged = stack.enter_context(_moved_at_the_end(name, overwrite=overwrite)) if _is_new_or_file(name) else name
+            write_bytes(staged, data, overwrite=overwrite)
 
 
 def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str | None) -> Job:
