@@ -19,6 +19,8 @@ from cylx.records import Observer, SilentObserver
 
 State = Literal["ok", "missing", "broken"]
 
+OLDEST = 10
+"""Minor version of Python 3."""
 NEEDED = ("click", "numba", "numpy", "plyfile", "pydantic", "PyYAML", "rich", "scipy")
 """What cylx imports, as it is called on the package index."""
 OPTIONAL = {
@@ -86,8 +88,8 @@ def diagnose(observer: Observer | None = None) -> list[Check]:
 def check_python() -> Check:
     """Check the version of Python."""
     detail = f"{platform.python_version()} ({platform.system()}, {platform.machine()}), cylx {__version__}"
-    if sys.version_info < (3, 10):
-        return Check("Python", "broken", detail, "install Python 3.10 or newer")
+    if platform.python_version_tuple()[0] != "3" or int(platform.python_version_tuple()[1]) < OLDEST:
+        return Check("Python", "broken", detail, f"install Python 3.{OLDEST} or newer")
     return Check("Python", "ok", detail)
 
 

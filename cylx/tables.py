@@ -58,7 +58,7 @@ def dataframe_of(cylinders: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
         If pandas is not installed.
     """
     try:
-        import pandas  # noqa: PLC0415, ICN001  an extra
+        import pandas  # noqa: PLC0415  an extra
     except ImportError:
         raise UsageError("the data frame", "pandas is not installed", "pip install 'cylx[dataframe]'") from None
     return pandas.DataFrame(table_of(cylinders))

@@ -33,9 +33,7 @@ def doctor(*, as_json: bool) -> None:
         content = {"works": works, "checks": [asdict(check) for check in checks]}
         answer(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     else:
-        show_table(
-            ["what", "state", "detail", "remedy"], [[c.name, c.state, c.detail, c.remedy] for c in checks]
-        )
+        show_table(["what", "state", "detail", "remedy"], [[c.name, c.state, c.detail, c.remedy] for c in checks])
         answer("cylinders can be found\n" if works else "cylinders cannot be found: see what is missing or broken\n")
     if not works:
         raise click.exceptions.Exit(1)

@@ -31,7 +31,9 @@ _UNITS = ("m", "mm", "cm", "in", "ft")
 @click.argument("result", shell_complete=complete_files)
 @click.argument("outputs", metavar="OUT...", nargs=-1, required=True, shell_complete=complete_files)
 @click.option(
-    "--units", type=click.Choice(_UNITS), help="Unit of the scan; needed for .glb, .step, .ifc and .dxf, which have one."
+    "--units",
+    type=click.Choice(_UNITS),
+    help="Unit of the scan; .glb, .step, .ifc and .dxf need it.",
 )
 @click.option("--min-confidence", type=click.FloatRange(0, 1), metavar="X", help="Leave out what is less sure.")
 @overwrite_option

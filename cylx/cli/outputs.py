@@ -175,7 +175,9 @@ def write_together(contents: Mapping[str, bytes], *, overwrite: bool) -> None:
 
     with contextlib.ExitStack() as stack:
         for name, data in contents.items():
-            staged = stack.enter_context(_moved_at_the_end(name, overwrite=overwrite)) if _is_new_or_file(name) else name
+            staged = (
+                stack.enter_context(_moved_at_the_end(name, overwrite=overwrite)) if _is_new_or_file(name) else name
+            )
             write_bytes(staged, data, overwrite=overwrite)
 
 

@@ -9,7 +9,7 @@ from cylx.export.drawing import Drawing, Exported
 from cylx.tables import table_of
 
 
-def write(drawing: Drawing, suffix: str) -> Exported:  # noqa: ARG001  one signature for all formats
+def write(drawing: Drawing, suffix: str) -> Exported:
     """Write the table of the cylinders, comma-separated, with their names of columns first; empty is unknown.
 
     Parameters

@@ -12,7 +12,7 @@ APPLICATION = "CYLX"
 _UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6}  # $INSUNITS
 
 
-def write(drawing: Drawing, suffix: str) -> Exported:  # noqa: ARG001  one signature for all formats
+def write(drawing: Drawing, suffix: str) -> Exported:
     """Write a DXF file (R2010) with a line from end to end of each cylinder, in its colour.
 
     Extended data of the application `CYLX` have the number (1071) and the radius (1041, a distance) of each.
@@ -29,9 +29,12 @@ def write(drawing: Drawing, suffix: str) -> Exported:  # noqa: ARG001  one signa
     before = ezdxf.options.write_fixed_meta_data_for_testing
     ezdxf.options.write_fixed_meta_data_for_testing = True  # no times and no random numbers
     try:
-        document = ezdxf.new("R2010")  # type: ignore[attr-defined]
+        document = ezdxf.new("R2010")
         document.header["$INSUNITS"] = _UNITS[drawing.unit or "m"]
         document.header["$MEASUREMENT"] = int(drawing.unit not in {"in", "ft"})
+        classes = document.classes
+        classes.add_required_classes(document.dxfversion)
+        classes.classes = dict(sorted(classes.classes.items()))  # they come out of a set
         document.layers.add(LAYER)
         document.appids.add(APPLICATION)
         space = document.modelspace()

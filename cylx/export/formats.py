@@ -126,4 +126,4 @@ def render(drawing: Drawing, known: Format, place: str) -> Exported:
     if not (drawing.pieces or known.may_be_empty):
         raise OutputError(place, f"there is no cylinder, and a {known.suffix} file cannot be empty", "use .csv")
     write = import_module(f"cylx.export.{known.home}").write
-    return cast(Callable[[Drawing, str], Exported], write)(drawing, known.suffix)
+    return cast("Callable[[Drawing, str], Exported]", write)(drawing, known.suffix)

@@ -16,7 +16,7 @@ _NAMES = {"in": "INCH", "ft": "FOOT"}
 _NO_TIME = "1970-01-01T00:00:00"
 
 
-def write(drawing: Drawing, suffix: str) -> Exported:  # noqa: ARG001  one signature for all formats
+def write(drawing: Drawing, suffix: str) -> Exported:
     """Write an IFC4 file with an `IfcPipeSegment` for each cylinder, in the unit of the scan.
 
     Each is placed where its cylinder starts, its z axis along that of the cylinder; the property set `cylx` has its
@@ -61,9 +61,7 @@ class _Model:
         self.root("IfcRelAggregates", "project", RelatingObject=project, RelatedObjects=[building])
         segments = [self.segment(piece, building.ObjectPlacement) for piece in drawing.pieces]
         if segments:
-            self.root(
-                "IfcRelContainedInSpatialStructure", "scan", RelatedElements=segments, RelatingStructure=building
-            )
+            self.root("IfcRelContainedInSpatialStructure", "scan", RelatedElements=segments, RelatingStructure=building)
 
     def text(self) -> str:
         """Give the file, without the time it was written at."""
@@ -156,6 +154,4 @@ class _Model:
             "IfcPropertySet", GlobalId=self.compress(uuid.uuid5(self.seed, f"properties {piece.name}").hex),
             Name="cylx", HasProperties=properties,
         )  # fmt: skip
-        self.root(
-            "IfcRelDefinesByProperties", piece.name, RelatedObjects=[segment], RelatingPropertyDefinition=own
-        )
+        self.root("IfcRelDefinesByProperties", piece.name, RelatedObjects=[segment], RelatingPropertyDefinition=own)

@@ -132,7 +132,9 @@ def _obj(drawing: Drawing) -> bytes:
         mesh = Trimesh(corners + piece.shape.point, faces, vertex_colors=color, process=False)
         scene.add_geometry(mesh, geom_name=piece.name, node_name=piece.name)
     digits = max(6, 6 - floor(log10(min(piece.shape.radius for piece in drawing.pieces))))
-    text = scene.export(file_type="obj", include_normals=False, digits=digits, header=f"{len(drawing.pieces)} cylinders")
+    text = scene.export(
+        file_type="obj", include_normals=False, digits=digits, header=f"{len(drawing.pieces)} cylinders"
+    )
     return f"{text.rstrip()}\n".encode()
 
 
@@ -146,9 +148,7 @@ def _glb(drawing: Drawing) -> bytes:
         place = np.eye(4)
         place[:3, 3] = scale * piece.shape.point
         mesh = _colored(piece, scale)
-        scene.add_geometry(
-            mesh, geom_name=piece.name, node_name=piece.name, parent_node_name="z up", transform=place
-        )
+        scene.add_geometry(mesh, geom_name=piece.name, node_name=piece.name, parent_node_name="z up", transform=place)
     return bytes(scene.export(file_type="glb", include_normals=False))
 
 

@@ -13,7 +13,7 @@ _NO_TIME = "1970-01-01T00:00:00"
 _STAMP = re.compile(rb"(FILE_NAME\('[^']*',')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d")
 
 
-def write(drawing: Drawing, suffix: str) -> Exported:  # noqa: ARG001  one signature for all formats
+def write(drawing: Drawing, suffix: str) -> Exported:
     """Write a STEP file (AP214) with a named, coloured solid for each cylinder, in the unit of the scan.
 
     Parameters
