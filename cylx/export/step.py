@@ -26,7 +26,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     from OCP.Interface import Interface_Static  # noqa: PLC0415  an extra
     from OCP.Message import Message, Message_Gravity  # noqa: PLC0415
     from OCP.STEPCAFControl import STEPCAFControl_Writer  # noqa: PLC0415
-    from OCP.STEPControl import STEPControl_StepModelType  # noqa: PLC0415
+    from OCP.STEPControl import STEPControl_Controller, STEPControl_StepModelType  # noqa: PLC0415
     from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415
     from OCP.TDocStd import TDocStd_Document  # noqa: PLC0415
     from OCP.XCAFDoc import XCAFDoc_DocumentTool  # noqa: PLC0415
@@ -37,8 +37,10 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     document = TDocStd_Document(TCollection_ExtendedString("cylx"))
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, METRES[unit])
     labels = [_add(document, piece) for piece in drawing.pieces]
+    STEPControl_Controller.Init_s()  # before it there is no unit to be set
     before = Interface_Static.CVal_s("write.step.unit")
-    Interface_Static.SetCVal_s("write.step.unit", unit.upper())
+    if not Interface_Static.SetCVal_s("write.step.unit", unit.upper()):
+        raise RuntimeError(f"Open CASCADE does not know the unit {unit}")
     try:
         writer = STEPCAFControl_Writer()
         writer.SetColorMode(True)
