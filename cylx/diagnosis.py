@@ -173,7 +173,7 @@ def check_extra(name: str) -> Check:
 
 def check_extraction(observer: Observer | None = None) -> Check:
     """Check that a cylinder of radius 1 that was made up is found, its radius within 1 %."""
-    remedy = "run 'cylx doctor --debug', and report what it says if all else is well"
+    remedy = "if all else is well, run 'cylx extract --debug' on a scan, and report what it says"
     try:
         from cylx.api import extract  # noqa: PLC0415  brings everything
         from cylx.synthetic import single  # noqa: PLC0415
