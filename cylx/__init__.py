@@ -12,6 +12,9 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from cylx.api import extract as extract
+    from cylx.api import read_result as read_result
+    from cylx.api import to_dataframe as to_dataframe
+    from cylx.api import to_dict as to_dict
     from cylx.config import Config as Config
     from cylx.config import load_config as load_config
     from cylx.errors import CylxError as CylxError
@@ -40,6 +43,9 @@ _HOMES = {
     "extract": "cylx.api",
     "load_config": "cylx.config",
     "read_cloud": "cylx.io",
+    "read_result": "cylx.api",
+    "to_dataframe": "cylx.api",
+    "to_dict": "cylx.api",
     "write_annotated": "cylx.io",
 }
 

@@ -1,18 +1,19 @@
-"""The whole method in one call."""
+"""The whole method in one call, and what it found as other programs want it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cylx.config import Config, check_tolerance, load_config
 from cylx.config_catalogue import Given
 from cylx.config_layers import named_options
-from cylx.io import read_cloud
+from cylx.io import read_cloud, read_json
 from cylx.pipeline import extract_cylinders
 from cylx.records import Crop, Extraction, Observer, PointCloud, Selection, SilentObserver
+from cylx.results import Result
 from cylx.selection import select
 
 if TYPE_CHECKING:
@@ -148,3 +149,54 @@ def extract(
     else:
         cloud = PointCloud.from_array(points_or_path)
     return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer or SilentObserver())
+
+
+def read_result(path: str | PathLike[str]) -> Result:
+    """Read the result of `cylx extract`.
+
+    Parameters
+    ----------
+    path : str or Path
+        `NAME.cylinders.json`, or `-` for standard input.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or is no result of this version of the format.
+    """
+    return Result.parse(read_json(Path(path)), str(path))
+
+
+def to_dict(extraction: Extraction) -> dict[str, Any]:
+    """Give an extraction as the JSON object that `cylx extract` writes.
+
+    Parameters
+    ----------
+    extraction : Extraction
+
+    Examples
+    --------
+    >>> import cylx, cylx.synthetic
+    >>> found = cylx.extract(cylx.synthetic.single(points=2000, seed=1).points)
+    >>> [round(cylinder["radius"], 1) for cylinder in cylx.to_dict(found)["cylinders"]]
+    [1.0]
+    """
+    return Result.of(extraction).to_object()
+
+
+def to_dataframe(found: Extraction | Result) -> Any:  # noqa: ANN401  pandas is an extra
+    """Give the cylinders as a pandas data frame, one row each.
+
+    Vectors have a column for each of x, y and z, and keys of inner objects follow that of the object:
+    `uncertainty_radius` is the standard deviation of the radius.
+
+    Parameters
+    ----------
+    found : Extraction or Result
+
+    Raises
+    ------
+    UsageError
+        If pandas is not installed.
+    """
+    return (Result.of(found) if isinstance(found, Extraction) else found).to_dataframe()

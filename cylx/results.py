@@ -29,6 +29,7 @@ from cylx.json_parts import (
     plain_numbers,
     text_of,
 )
+from cylx.tables import dataframe_of
 
 if TYPE_CHECKING:
     from cylx.records import CylinderFit, Extraction, StageReport
@@ -171,6 +172,12 @@ class ResultCylinder(Measured, Numbered):  # the keys of the last one come first
         match = None if fit.nominal is None else CatalogueMatch.model_validate(fit.nominal, from_attributes=True)
         return cls(id=index, **cls.keys_of(fit), catalogue=match)
 
+    def to_object(self) -> dict[str, Any]:
+        """Give the JSON object; what was not computed is left out."""
+        content = self.model_dump(mode="json")
+        drop_missing([content, content["catalogue"] or {}])
+        return content
+
 
 class Result(Part):
     """The cylinders of one cloud, how they were found, and with which settings they are found again."""
@@ -241,9 +248,12 @@ class Result(Part):
     def to_object(self) -> dict[str, Any]:
         """Give the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        drop_missing([content["input"], *content["cylinders"]])
-        drop_missing(cylinder["catalogue"] for cylinder in content["cylinders"] if "catalogue" in cylinder)
-        return content
+        drop_missing([content["input"]])
+        return content | {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
+
+    def to_dataframe(self) -> Any:  # noqa: ANN401  pandas is an extra
+        """Give the cylinders as a pandas data frame, its columns those of `cylx.tables.table_of`."""
+        return dataframe_of([cylinder.to_object() for cylinder in self.cylinders])
 
     def to_json(self) -> str:
         """Give the text of the file, with a newline at its end."""

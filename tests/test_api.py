@@ -1,11 +1,13 @@
 """`cylx.extract`: the same as the command, in one call."""
 
+import sys
+
 import numpy as np
 import pytest
 
 import cylx
 from cylx.config import CatalogueEntry, load_config
-from cylx.errors import ConfigError, InputError
+from cylx.errors import ConfigError, InputError, UsageError
 from cylx.records import PointCloud, SilentObserver
 from cylx.synthetic import single
 
@@ -109,3 +111,48 @@ def test_the_one_line_finds_a_cylinder():
     assert abs(fit.cylinder.direction[2]) == pytest.approx(1.0, abs=1e-6)
     assert found.config.seed == 1
     assert len(found.labels) == 4000
+
+
+def test_an_extraction_as_arrays(make_extraction):
+    found = make_extraction(cylinders=3)
+    arrays = found.to_arrays()
+    shapes = {"points": (3, 3), "directions": (3, 3), "starts": (3, 3), "ends": (3, 3)}
+    assert {name: array.shape for name, array in arrays.items()} == {**dict.fromkeys(arrays, (3,)), **shapes}
+    assert arrays["radii"].tolist() == [1.0, 2.0, 3.0]
+    assert arrays["starts"].tolist() == [[0, 0, 0]] * 3
+    assert np.isnan(arrays["confidences"]).all()
+    assert arrays["inliers"].dtype == np.int64
+    assert {array.shape for array in make_extraction(cylinders=0).to_arrays().values()} == {(0, 3), (0,)}
+
+
+def test_an_extraction_as_an_object_is_what_the_command_writes(make_extraction, tmp_path):
+    found = make_extraction()
+    assert cylx.to_dict(found) == cylx.Result.of(found).to_object()
+    (tmp_path / "r.json").write_text(cylx.Result.of(found).to_json(), encoding="utf-8")
+    assert cylx.read_result(tmp_path / "r.json").to_object() == cylx.to_dict(found)
+    assert cylx.read_result(str(tmp_path / "r.json")).cylinders[1].radius == 2.0
+
+
+def test_what_is_no_result_is_named(tmp_path):
+    (tmp_path / "r.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match=r"r\.json: cylx_version: is missing"):
+        cylx.read_result(tmp_path / "r.json")
+    with pytest.raises(InputError, match="no such file"):
+        cylx.read_result(tmp_path / "none.json")
+
+
+def test_a_data_frame(make_extraction, tmp_path):
+    pytest.importorskip("pandas", reason="needs cylx[dataframe]")
+    found = make_extraction()
+    frame = cylx.to_dataframe(found)
+    assert frame["radius"].tolist() == [1.0, 2.0]
+    assert frame["end_z"].tolist() == [4.0, 4.0]
+    assert frame["evidence_slope"].tolist() == [0.125, 0.125]
+    assert frame.equals(cylx.Result.of(found).to_dataframe())
+    assert cylx.to_dataframe(make_extraction(cylinders=0)).shape[0] == 0
+
+
+def test_without_pandas_the_extra_is_named(make_extraction, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(UsageError, match=r"pandas is not installed; pip install 'cylx\[dataframe\]'"):
+        cylx.to_dataframe(make_extraction())

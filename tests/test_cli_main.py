@@ -15,9 +15,9 @@ from cylx.cli.group import LazyGroup
 from cylx.cli.options import debug_option
 from cylx.errors import BatchError, ConfigError, InputError, NothingFoundError, OutputError, UsageError
 
-COMMANDS = ["extract", "view", "info", "config", "synth", "evaluate", "diff", "reproduce"]
+COMMANDS = ["extract", "view", "info", "config", "synth", "evaluate", "diff", "export", "doctor", "reproduce"]
 LEAVES = [
-    *(["extract"], ["info"], ["evaluate"], ["diff"]),
+    *(["extract"], ["info"], ["evaluate"], ["diff"], ["export"], ["doctor"]),
     *(["config", name] for name in ("init", "show", "check", "schema")),
     *(["synth", name] for name in ("single", "multi")),
 ]
@@ -185,7 +185,7 @@ def test_a_name_that_cannot_be_printed_is_no_failure(spawn_cylx, tmp_path, encod
 
 def test_a_shell_can_complete_commands(spawn_cylx):
     shown = spawn_cylx(env={**os.environ, "_CYLX_COMPLETE": "bash_complete", "COMP_WORDS": "cylx e", "COMP_CWORD": "1"})
-    assert shown.stdout.split() == [b"plain,extract", b"plain,evaluate"]
+    assert shown.stdout.split() == [b"plain,extract", b"plain,evaluate", b"plain,export"]
 
 
 def test_a_reader_that_went_away_is_no_news():

@@ -22,6 +22,8 @@ from cylx.cli.options import debug_option
         "synth": "cylx.cli.synth",
         "evaluate": "cylx.cli.evaluate",
         "diff": "cylx.cli.diff",
+        "export": "cylx.cli.export",
+        "doctor": "cylx.cli.doctor",
         "reproduce": "cylx.cli.reproduce",
     },
     examples=["cylx extract scan.ply", "cylx extract scan.ply -o - | jq '.cylinders | length'"],
@@ -32,7 +34,7 @@ from cylx.cli.options import debug_option
 def main() -> None:
     """Find every cylinder in a point cloud that has no normals.
 
-    Exit codes: 0 done; 1 a difference was found, or a bug; 2 usage or configuration; 3 unreadable or unusable input; 4
-    output could not be written; 5 fewer cylinders than --require; 6 some of several inputs failed; 130 interrupted; 141
-    the reader of a pipe went away.
+    Exit codes: 0 done; 1 a difference or a fault was found, or a bug; 2 usage or configuration; 3 unreadable or
+    unusable input; 4 output could not be written; 5 fewer cylinders than --require; 6 some of several inputs failed;
+    130 interrupted; 141 the reader of a pipe went away.
     """

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cylx.cli.staging import STREAM, moved_at_the_end
 from cylx.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
 REPORT, PICTURE = ".report.html", ".cylinders.png"
-STREAM = "-"
 
 
 @dataclass(frozen=True)
@@ -179,8 +179,8 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
     with contextlib.ExitStack() as stack:
 
         def staged(name: str) -> str | Path:
-            """Give the name to write an output to for now; a stream or a device has no other."""
-            return stack.enter_context(_moved_at_the_end(name, overwrite=overwrite)) if _is_new_or_file(name) else name
+            """Give the name to write an output to for now."""
+            return stack.enter_context(moved_at_the_end(name, overwrite=overwrite))
 
         result = staged(job.result)  # the first is moved last: where the result is, all is
         if job.annotated is not None:
@@ -287,23 +287,3 @@ def _check_twins(jobs: Sequence[Job]) -> None:
 def _is_there(scan: str) -> bool:
     """Say whether an input can be looked for; what is missing is reported by whoever reads it."""
     return scan == STREAM or (Path(scan).exists() and not Path(scan).is_dir())
-
-
-def _is_new_or_file(name: str) -> bool:
-    """Say whether an output is a file, and not a stream or a device."""
-    return name != STREAM and (Path(name).is_file() or not Path(name).exists())
-
-
-@contextlib.contextmanager
-def _moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[Path]:
-    """Give a temporary name beside `name`, moved there if all goes well, removed if not."""
-    from cylx.io import check_writable, temporary_beside
-
-    check_writable(name, overwrite=overwrite)
-    target = Path(os.path.realpath(name))
-    staged = temporary_beside(target, target.suffix)
-    try:
-        yield staged
-        staged.replace(target)
-    finally:
-        staged.unlink(missing_ok=True)

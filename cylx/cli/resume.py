@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cylx.cli.outputs import STREAM
+from cylx.cli.staging import STREAM
 from cylx.errors import InputError, OutputError
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from cylx.cli.outputs import ANNOTATED, STREAM
+from cylx.cli.outputs import ANNOTATED
+from cylx.cli.staging import STREAM
 from cylx.cli.summary import TABLE, is_own_table
 from cylx.errors import InputError
 

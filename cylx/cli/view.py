@@ -9,7 +9,8 @@ import click
 
 from cylx.cli.group import ExampleCommand
 from cylx.cli.options import complete_files, debug_option
-from cylx.cli.outputs import ANNOTATED, RESULT, STREAM
+from cylx.cli.outputs import ANNOTATED, RESULT
+from cylx.cli.staging import STREAM
 from cylx.errors import InputError, UsageError
 
 if TYPE_CHECKING:

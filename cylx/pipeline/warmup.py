@@ -40,6 +40,11 @@ def kernels_are_cold() -> bool:
     return bool(sum(find_cell.stats.cache_misses.values()) > before)
 
 
+def kernel_folder() -> str:
+    """Name the folder where compiled kernels are kept."""
+    return str(find_cell.stats.cache_path)
+
+
 def practice_cloud() -> FloatArray:
     """Give a small cloud that calls every kernel: two cylinders and a floor, shape (N, 3)."""
     rng = np.random.default_rng(0)

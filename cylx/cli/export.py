@@ -1,0 +1,95 @@
+"""`cylx export`: the cylinders of a result for other programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from cylx.cli.failures import tell
+from cylx.cli.group import ExampleCommand
+from cylx.cli.options import complete_files, debug_option, overwrite_option
+from cylx.cli.outputs import check_apart
+from cylx.cli.staging import write_together
+from cylx.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from cylx.export import Drawing, Exported
+    from cylx.results import ResultCylinder
+
+_UNITS = ("m", "mm", "cm", "in", "ft")
+
+
+@click.command(
+    cls=ExampleCommand,
+    examples=[
+        "cylx export room.cylinders.json room.csv room.obj",
+        "cylx export room.cylinders.json room.step --units m --min-confidence 0.9",
+    ],
+)
+@click.argument("result", shell_complete=complete_files)
+@click.argument("outputs", metavar="OUT...", nargs=-1, required=True, shell_complete=complete_files)
+@click.option(
+    "--units",
+    type=click.Choice(_UNITS),
+    help="Unit of the scan; .glb, .step, .ifc and .dxf need it.",
+)
+@click.option("--min-confidence", type=click.FloatRange(0, 1), metavar="X", help="Leave out what is less sure.")
+@overwrite_option
+@debug_option
+def export(
+    *, result: str, outputs: tuple[str, ...], units: str | None, min_confidence: float | None, overwrite: bool
+) -> None:
+    """Write the cylinders of RESULT for other programs.
+
+    The suffix of each OUT says how: .ply, .obj, .glb and .stl are meshes, .csv is a table, .step and .stp are exact
+    solids, .ifc has pipe segments, and .dxf centre lines. All but the table need an extra, such as 'cylx[mesh]'.
+    """
+    from cylx.export import format_of, render
+    from cylx.io import check_writable
+
+    formats = {name: format_of(name) for name in outputs}
+    check_apart([result], outputs)
+    for name, known in formats.items():
+        known.demand(name, units)
+        check_writable(name, overwrite=overwrite)
+    drawing = _draw(result, units, min_confidence)
+    written = {name: render(drawing, known, name) for name, known in formats.items()}
+    write_together({name: exported.data for name, exported in written.items()}, overwrite=overwrite)
+    _report(result, drawing, written)
+
+
+def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing:
+    """Read a result and choose what is drawn."""
+    import numpy as np
+
+    from cylx.export import draw
+    from cylx.io import read_json
+    from cylx.palette import cylinder_colors
+    from cylx.results import Result
+
+    content = Result.parse(read_json(path), path)
+    chosen = content.cylinders if min_confidence is None else _sure(path, content.cylinders, min_confidence)
+    ids = np.array([cylinder.id for cylinder in chosen], dtype=np.int64)
+    return draw(chosen, cylinder_colors(ids), unit=units, place=path)
+
+
+def _sure(path: str, cylinders: Sequence[ResultCylinder], least: float) -> list[ResultCylinder]:
+    """Choose the cylinders that are sure enough."""
+    if any(cylinder.confidence is None for cylinder in cylinders):
+        raise InputError(path, "its cylinders have no confidence", "leave --min-confidence out")
+    return [cylinder for cylinder in cylinders if cylinder.confidence is not None and cylinder.confidence >= least]
+
+
+def _report(path: str, drawing: Drawing, written: dict[str, Exported]) -> None:
+    """Say what was written where, and what its reader has to know."""
+    count = len(drawing.cylinders)
+    tell(f"{path}: {count} cylinder{'' if count == 1 else 's'}, written to {', '.join(written)}")
+    if drawing.flat and any(not name.lower().endswith(".csv") for name in written):
+        tell(f"warning: of height 0, and only in tables: cylinder {', '.join(map(str, drawing.flat))}")
+    for name, exported in written.items():
+        if exported.offset is not None:
+            x, y, z = exported.offset
+            tell(f"warning: {name}: add {x:.0f} {y:.0f} {z:.0f} to all coordinates; they are too large for its numbers")

@@ -1,0 +1,12 @@
+"""Cylinders for other programs: meshes, tables and CAD files, one file a family of formats.
+
+Each `write` takes a `Drawing` and gives the bytes of a file; the same drawing gives the same bytes. The libraries that
+write the formats are extras, imported when they are needed.
+"""
+
+from __future__ import annotations
+
+from cylx.export.drawing import Drawing, Exported, draw
+from cylx.export.formats import METRES, Format, format_of, render
+
+__all__ = ["METRES", "Drawing", "Exported", "Format", "draw", "format_of", "render"]

@@ -1,0 +1,26 @@
+"""CSV: one line a cylinder, a column for each number; no extra is needed."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+from cylx.export.drawing import Drawing, Exported
+from cylx.tables import table_of
+
+
+def write(drawing: Drawing, suffix: str) -> Exported:
+    """Write the table of the cylinders, comma-separated, with their names of columns first; empty is unknown.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    suffix : str
+        `.csv`.
+    """
+    table = table_of([cylinder.to_object() for cylinder in drawing.cylinders])
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table)
+    writer.writerows(zip(*table.values(), strict=True))
+    return Exported(text.getvalue().encode())

@@ -1,0 +1,114 @@
+"""What is exported: the cylinders of a result as shapes, with a name and a colour each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.errors import InputError
+from cylx.geometry.cylinder import Cylinder
+from cylx.results import ResultCylinder
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Piece:
+    """A finite cylinder to be drawn.
+
+    Parameters
+    ----------
+    id : int
+        Its number in the result.
+    shape : Cylinder
+        Scene units; its height is > 0.
+    color : tuple of int
+        Red, green and blue, 0 to 255.
+    found : ResultCylinder
+        What the result says of it.
+    """
+
+    id: int
+    shape: Cylinder
+    color: tuple[int, int, int]
+    found: ResultCylinder
+
+    @property
+    def name(self) -> str:
+        """What it is called where a format has names."""
+        return f"cylinder {self.id}"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawing:
+    """All that goes into a file.
+
+    Parameters
+    ----------
+    cylinders : tuple of ResultCylinder
+        As the result has them.
+    pieces : tuple of Piece
+        Those of them that have a height.
+    unit : str or None
+        Unit of the scan, a key of `METRES`; None if it was not said.
+    """
+
+    cylinders: tuple[ResultCylinder, ...]
+    pieces: tuple[Piece, ...]
+    unit: str | None = None
+
+    @property
+    def flat(self) -> list[int]:
+        """Ids of the cylinders without a height, which cannot be drawn."""
+        drawn = {piece.id for piece in self.pieces}
+        return [cylinder.id for cylinder in self.cylinders if cylinder.id not in drawn]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exported:
+    """The bytes of a file, and what its reader has to know.
+
+    Parameters
+    ----------
+    data : bytes
+    offset : tuple of float or None
+        What was taken off all coordinates, scene units; None if they are as in the scan.
+    """
+
+    data: bytes
+    offset: tuple[float, float, float] | None = None
+
+
+def draw(
+    cylinders: Sequence[ResultCylinder], colors: NDArray[np.uint8], *, unit: str | None = None, place: str = "result"
+) -> Drawing:
+    """Make the shapes of cylinders.
+
+    Parameters
+    ----------
+    cylinders : sequence of ResultCylinder
+    colors : ndarray of shape (M, 3), uint8
+        Red, green and blue of each.
+    unit : str, optional
+        Unit of the scan: `m`, `mm`, `cm`, `in` or `ft`.
+    place : str
+        Name of the result in an error.
+
+    Raises
+    ------
+    InputError
+        If the axis of a cylinder has no direction.
+    """
+    pieces = []
+    for cylinder, color in zip(cylinders, colors.tolist(), strict=True):
+        try:
+            shape = Cylinder(
+                np.array(cylinder.axis_point), np.array(cylinder.axis_direction), cylinder.radius, cylinder.height
+            )
+        except ValueError as error:
+            where = f"{place}: cylinder {cylinder.id}"
+            raise InputError(where, str(error), "give a result as cylx writes it") from None
+        if shape.height > 0.0:
+            pieces.append(Piece(cylinder.id, shape, (color[0], color[1], color[2]), cylinder))
+    return Drawing(tuple(cylinders), tuple(pieces), unit)

@@ -1,0 +1,129 @@
+"""The formats by their suffixes: what writes each, which extra that takes, and whether it has a unit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import PurePath
+from typing import cast
+
+from cylx.errors import OutputError, UsageError
+from cylx.export.drawing import Drawing, Exported
+
+METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048}
+"""Length of each unit, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """A format that cylinders can be written in.
+
+    Parameters
+    ----------
+    suffix : str
+        With its dot, in small letters.
+    home : str
+        Module of this room that writes it.
+    library : str or None
+        What it needs; None if that comes with cylx.
+    extra : str or None
+        Name of the extra that brings the library.
+    has_unit : bool
+        Whether lengths have a unit in it.
+    may_be_empty : bool
+        Whether a file without any cylinder can be read.
+    """
+
+    suffix: str
+    home: str
+    library: str | None = None
+    extra: str | None = None
+    has_unit: bool = False
+    may_be_empty: bool = False
+
+    def demand(self, place: str, unit: str | None) -> None:
+        """Refuse what cannot be written: its library or the unit is missing.
+
+        Parameters
+        ----------
+        place : str
+            Name of the output in an error.
+        unit : str or None
+            Unit of the scan.
+
+        Raises
+        ------
+        UsageError
+            If one of them is missing.
+        """
+        if self.has_unit and unit is None:
+            units = ", ".join(METRES)
+            raise UsageError(place, f"{self.suffix} has a unit of length", f"give that of the scan by --units: {units}")
+        if self.library is None:
+            return
+        try:
+            import_module(self.library)
+        except ImportError:
+            remedy = f"pip install 'cylx[{self.extra}]'"
+            raise UsageError(place, f"{self.suffix} needs {self.library}, which is not installed", remedy) from None
+
+
+FORMATS = {
+    known.suffix: known
+    for known in (
+        Format(".ply", "meshes", "trimesh", "mesh"),
+        Format(".obj", "meshes", "trimesh", "mesh"),
+        Format(".glb", "meshes", "trimesh", "mesh", has_unit=True),
+        Format(".stl", "meshes", "trimesh", "mesh"),
+        Format(".csv", "csv_text", may_be_empty=True),
+        Format(".step", "step", "OCP", "step", has_unit=True),
+        Format(".stp", "step", "OCP", "step", has_unit=True),
+        Format(".ifc", "ifc", "ifcopenshell", "ifc", has_unit=True, may_be_empty=True),
+        Format(".dxf", "dxf", "ezdxf", "dxf", has_unit=True, may_be_empty=True),
+    )
+}
+
+
+def format_of(name: str) -> Format:
+    """Tell the format of a file by its suffix.
+
+    Raises
+    ------
+    UsageError
+        If there is no such format.
+
+    Examples
+    --------
+    >>> format_of("pipes.STL").extra
+    'mesh'
+    """
+    suffix = PurePath(name).suffix.lower()
+    if suffix not in FORMATS:
+        fault = f"{suffix} is no format that is known" if suffix else "has no suffix that names a format"
+        raise UsageError(name, fault, f"use one of {', '.join(FORMATS)}")
+    return FORMATS[suffix]
+
+
+def render(drawing: Drawing, known: Format, place: str) -> Exported:
+    """Write a drawing in a format.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    known : Format
+    place : str
+        Name of the output in an error.
+
+    Raises
+    ------
+    OutputError
+        If there is nothing to write, and the format has no way to say so.
+    UsageError
+        If the library that writes it is not installed.
+    """
+    known.demand(place, drawing.unit)
+    if not (drawing.pieces or known.may_be_empty):
+        raise OutputError(place, f"there is no cylinder, and a {known.suffix} file cannot be empty", "use .csv")
+    write = import_module(f"cylx.export.{known.home}").write
+    return cast("Callable[[Drawing, str], Exported]", write)(drawing, known.suffix)
