@@ -21,7 +21,7 @@ from cylx.export import METRES, draw, format_of, render
 from cylx.export.formats import FORMATS
 from cylx.export.meshes import SIDES, Z_UP
 from cylx.geometry.cylinder import Cylinder
-from cylx.io import cylinder_colors
+from cylx.palette import cylinder_colors
 from cylx.results import ResultCylinder
 
 UTM = np.array([500000.0, 5000000.0, 100.0])
