@@ -243,8 +243,7 @@ REFUSED = [
     ),
     (
         "method: tran\nscene: {known_radius: 1}",
-        "scene.known_radius: is for method gt alone, and the method is tran; "
-        "leave it out, or use method gt",
+        "scene.known_radius: is for method gt alone, and the method is tran; leave it out, or use method gt",
     ),
     ("msac: {removal: 1}", "my.yaml: msac.removal: 1 is out of range; it must be < 1"),
     ("tran: {normal_angle_deg: 90}", "my.yaml: tran.normal_angle_deg: 90 is out of range; it must be < 90"),
