@@ -196,7 +196,7 @@ def _console(stream: object) -> Console:
     """Open a console on a stream; where nobody looks, lines are as wide as they have to be."""
     from rich.console import Console
 
-    console = Console(file=stream, soft_wrap=False)  # type: ignore[arg-type]  # click's streams
+    console = Console(file=stream, soft_wrap=False)  # type: ignore[arg-type]  # click may have put its own stream there
     console.width = max(console.width, _NARROWEST) if console.is_terminal else _WIDE_ENOUGH
     return console
 

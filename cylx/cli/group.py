@@ -21,7 +21,7 @@ class ExampleCommand(click.Command):
         Command lines.
     """
 
-    def __init__(self, *args: Any, examples: Sequence[str] = (), **attributes: Any) -> None:  # noqa: ANN401  click's
+    def __init__(self, *args: Any, examples: Sequence[str] = (), **attributes: Any) -> None:  # noqa: ANN401  the signature is click's
         super().__init__(*args, **attributes)
         self.examples = examples
 
@@ -49,7 +49,7 @@ class LazyGroup(ExampleGroup):
         Command to the module that holds it under the same name.
     """
 
-    def __init__(self, *args: Any, homes: Mapping[str, str], **attributes: Any) -> None:  # noqa: ANN401  click's
+    def __init__(self, *args: Any, homes: Mapping[str, str], **attributes: Any) -> None:  # noqa: ANN401  the signature is click's
         super().__init__(*args, **attributes)
         self.homes = homes
 
@@ -80,7 +80,7 @@ class LazyGroup(ExampleGroup):
         info_name: str | None,
         args: list[str],
         parent: click.Context | None = None,
-        **extra: Any,  # noqa: ANN401  click's signature
+        **extra: Any,  # noqa: ANN401  the signature is click's
     ) -> click.Context:
         """Parse the group's own options."""
         with Failures():

@@ -253,7 +253,7 @@ def talking(command: Command) -> Command:
 
     verbose = click.option("-v", "--verbose", is_flag=True, help="Say what each stage kept and dropped, and why.")
     quiet = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-    return quiet(verbose(with_talk))  # type: ignore[return-value]  # as above
+    return quiet(verbose(with_talk))  # type: ignore[return-value]  # click keeps the signature
 
 
 def overwrite_option(command: Command) -> Command:

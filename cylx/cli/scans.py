@@ -92,7 +92,8 @@ def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
 
     for place, folders, files in os.walk(folder, onerror=refuse):
         folders[:] = sorted(name for name in folders if recursive and not name.startswith("."))
-        yield from (os.path.join(place, name) for name in sorted(files) if not name.startswith("."))  # noqa: PTH118
+        shown = sorted(name for name in files if not name.startswith("."))
+        yield from (str(Path(place, name)) for name in shown)
 
 
 def _is_foreign(path: str) -> bool:
