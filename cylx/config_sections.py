@@ -95,9 +95,9 @@ class SlicingConfig(Section):
     """Number of random planes N. More planes find more cylinders and take longer."""
     inclination_deg: Annotated[list[Inclination], Field(min_length=2, max_length=2)] | None = None
     """Least and greatest angle of the normals of these planes to `scene.axis`, degrees; null draws any."""
-    local_planes: Annotated[int, Field(ge=0)] = 2
+    local_planes: Annotated[int, Field(ge=0)] = 1
     """Planes through each window, besides one across its longest direction; 0 leaves the windows out."""
-    windows: Annotated[int, Field(ge=1)] = 300
+    windows: Annotated[int, Field(ge=1)] = 2000
     """Most windows of one scale, where nothing else explains the points. More windows find more thin, sparse pipes."""
     thickness: Positive | None = None
     """Full thickness of a slice through the whole cloud, scene units. Thicker slices smear the ellipse."""

@@ -18,6 +18,8 @@ WITNESS = 0.4
 smaller."""
 CONCENTRIC = 0.85
 """A candidate on the same axis that is thinner or thicker than this is one of another surface."""
+ALIKE = 0.4
+"""A candidate so many times thinner or thicker is one of another thing, or of a detail: a rim, a dent, an edge."""
 SAME = 0.15, math.cos(math.radians(6.0)), 0.1
 """A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
 
@@ -91,7 +93,7 @@ def is_contradicted(counts: tuple[int, int]) -> bool:
 
 @njit(cache=True, nogil=True)
 def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cosine: float, radius: float) -> int:
-    """Tell of a candidate whether it lies within `reach` of a cylinder's middle (1), and whether it agrees, too (2).
+    """Tell of a candidate whether it lies in a cylinder and is of like radius (1), and whether it agrees, too (2).
 
     Offset in the cylinder's radii, cosine of the angle, relative radius.
     """
@@ -100,10 +102,12 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
     square = dx * dx + dy * dy + dz * dz - height * height
     if abs(height) >= reach or square >= model[6] * model[6]:
         return 0
+    ratio = row[6] / model[6]
+    if not ALIKE < ratio < 1.0 / ALIKE:
+        return 0
     turn = row[3] * model[3] + row[4] * model[4] + row[5] * model[5]
     if square >= (offset * model[6]) ** 2 or abs(turn) <= cosine:
         return 1
-    ratio = row[6] / model[6]
     if abs(ratio - 1.0) < radius:
         return 2
     return 1 if CONCENTRIC < ratio < 1.0 / CONCENTRIC else 0  # a pipe within a pipe speaks for itself

@@ -55,6 +55,16 @@ def test_the_ends_are_mirrored_with_the_heights_and_do_not_know_order_or_unit(se
     assert np.allclose(visible_extent(scale * heights, angles, scale * half, scale), scale * ends, rtol=1e-9)
 
 
+def test_what_was_found_before_is_not_cut_where_it_is_thinly_seen():
+    rng = np.random.default_rng(0)
+    heights = np.concatenate([rng.uniform(-12, -4, 240), np.linspace(-4, 5, 28), rng.uniform(5, 12, 210)])
+    angles = rng.uniform(-1, 1, len(heights))
+    low, high = visible_extent(heights, angles, 12.0, 1.0)
+    assert low < -11.5
+    assert high < -1.0
+    assert np.allclose(visible_extent(heights, angles, 12.0, 1.0, doubt=0.4), (-12, 12), atol=0.3)
+
+
 @laws
 @given(seeds)
 def test_the_ends_are_points(seed):

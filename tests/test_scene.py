@@ -41,6 +41,13 @@ def test_a_plane_shows_its_spacing_and_noise(n, sigma):
     assert np.isclose(scene.noise, sigma, rtol=0.1)
 
 
+@pytest.mark.parametrize(("n", "sigma"), [(60000, 0.03), (60000, 0.05), (20000, 0.1), (200000, 0.03)])
+def test_noise_of_several_spacings_is_noise(n, sigma):
+    scene = measure_scene(single(points=n, sigma=sigma, seed=2).points)
+    assert sigma > 1.2 * scene.spacing
+    assert np.isclose(scene.noise, sigma, rtol=0.1)
+
+
 @pytest.mark.parametrize(("n", "theta_deg"), [(2500, 360), (2500, 90), (6000, 360)])
 @pytest.mark.parametrize("sigma", [0.003, 0.02])
 def test_a_cylinder_shows_its_spacing_and_noise(n, theta_deg, sigma):

@@ -100,6 +100,15 @@ def test_pieces_too_far_to_tell_stay_two():
     assert len(merge_pieces([one, other], ground, accept(ground))) == 1
 
 
+@pytest.mark.parametrize(("x", "kept"), [(0.0, 1), (0.3, 1), (2.1, 2)], ids=["in line", "nearly", "beside"])
+def test_ends_of_a_long_pipe_are_joined_if_they_point_at_each_other(x, kept):
+    shapes = pipe(0, 6), pipe(206, 212, x=x)
+    ground, parts, frame = world(*shapes)
+    # one alone tells the place of the other to 0.6 radii, which would not suffice to know it from a neighbour
+    vague = [finding(shape, part.points, frame, error=0.009) for shape, part in zip(shapes, parts, strict=True)]
+    assert len(merge_pieces(vague, ground, accept(ground))) == kept
+
+
 def test_the_judge_has_the_last_word():
     ground, findings, _ = world(pipe(0, 4), pipe(4, 8))
     assert len(merge_pieces(findings, ground, lambda segment, best: None)) == 2

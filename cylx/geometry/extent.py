@@ -27,7 +27,7 @@ of even points one in sixty looks so."""
 
 
 def visible_extent(
-    heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float = 0.35
+    heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float = 0.35, doubt: float = 1.0
 ) -> tuple[float, float] | None:
     """Find how far a surface goes on, by pieces of its height in which its arc is filled.
 
@@ -43,6 +43,9 @@ def visible_extent(
     radius : float
     filled : float
         A piece belongs if it fills this share of what the median piece fills.
+    doubt : float
+        Share of what is asked of a piece that is asked of those within `half`: less than 1 if they have been found to
+        belong before, so that a cylinder that grows is not cut where it is thinly seen.
 
     Returns
     -------
@@ -50,7 +53,7 @@ def visible_extent(
         Heights of the ends, None if fewer than 15 points are there.
     """
     ends = np.empty(2)
-    found = _find_ends(np.ascontiguousarray(heights), np.ascontiguousarray(angles), half, radius, filled, ends)
+    found = _find_ends(np.ascontiguousarray(heights), np.ascontiguousarray(angles), half, radius, filled, doubt, ends)
     return (float(ends[0]), float(ends[1])) if found else None
 
 
@@ -104,7 +107,13 @@ def fill_coordinates(
 
 @njit(cache=True, nogil=True)
 def _find_ends(
-    heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float, ends: FloatArray
+    heights: FloatArray,
+    angles: FloatArray,
+    half: float,
+    radius: float,
+    filled: float,
+    doubt: float,
+    ends: FloatArray,
 ) -> bool:
     counts, scratch = np.zeros(ARC_BINS), np.empty(ARC_BINS)
     arc = np.zeros(ARC_BINS, np.bool_)
@@ -131,8 +140,13 @@ def _find_ends(
     piece = max(0.25 * radius, FULL_PIECE / density)
     first = math.floor(lowest / piece)
     pieces = int(math.floor(highest / piece) - first) + 1
-    shares = _fill_shares(heights, angles, arc, width, piece, first, pieces, density * piece)
-    start, stop = _choose_run(shares, pieces, piece, first, half, filled, max(3.0 * radius, FULL_PIECE / density))
+    asked = np.ones(pieces)
+    for p in range(pieces):
+        if abs((first + p + 0.5) * piece) <= half:
+            asked[p] = doubt
+    shares = _fill_shares(heights, angles, arc, width, piece, first, pieces, FAINT * density * piece * asked)
+    bridge = max(3.0 * radius, FULL_PIECE / density)
+    start, stop = _choose_run(shares, pieces, piece, first, half, filled * asked, bridge)
     if start < 0:
         return False
     _set_ends(heights, angles, arc, (first + start) * piece, (first + stop + 1) * piece, 2.0 * piece, ends)
@@ -153,9 +167,9 @@ def _fill_shares(
     piece: float,
     first: float,
     pieces: int,
-    usual: float,
+    least: FloatArray,
 ) -> FloatArray:
-    """Give the share of the arc's bins that hold a point, for each piece of the height; 0 for faint ones."""
+    """Give the share of the arc's bins that hold a point, for each piece of the height; 0 for those too faint."""
     occupied = np.zeros((pieces, ARC_BINS), np.bool_)
     shares, counts = np.zeros(pieces), np.zeros(pieces)
     for i in range(len(heights)):
@@ -167,14 +181,14 @@ def _fill_shares(
                 occupied[p, b] = True
                 shares[p] += 1.0 / width
     for p in range(pieces):
-        if counts[p] < FAINT * usual:
+        if counts[p] < least[p]:
             shares[p] = 0.0
     return shares
 
 
 @njit(cache=True, nogil=True)
 def _choose_run(
-    shares: FloatArray, pieces: int, piece: float, first: float, half: float, filled: float, bridge: float
+    shares: FloatArray, pieces: int, piece: float, first: float, half: float, filled: FloatArray, bridge: float
 ) -> tuple[int, int]:
     """Give first and last piece of the run of filled ones that overlaps the known height most; gaps are bridged."""
     inside, scratch, n = np.empty(pieces), np.empty(pieces), np.int64(0)
@@ -187,7 +201,7 @@ def _choose_run(
         usual = 1.0
     best, start, stop, last, most = -1, -1, -1, -1, -math.inf
     for p in range(pieces + 1):
-        if p < pieces and shares[p] < filled * usual:
+        if p < pieces and shares[p] < filled[p] * usual:
             continue
         if start >= 0 and (p == pieces or p - last > bridge / piece + 1.0):
             overlap = min((first + last + 1) * piece, half) - max((first + start) * piece, -half)

@@ -20,6 +20,12 @@ SAMPLE = 3000
 """Neighbourhoods looked at; the mode of their noise then scatters by about 4 %."""
 NEIGHBOURS = (48, 96, 192)
 """Sizes of a neighbourhood: the next is taken where the patch is not wide against its thickness."""
+THICK = (384, 768, 1536, 3072, 6144)
+"""Sizes that are tried of a cloud whose noise is so many spacings that few of the patches are wide."""
+FEW_WIDE = 0.2
+"""Share of the patches below which that is so. Larger ones are tried until half of them are wide."""
+PIECES = 8
+"""A patch of more than one point of so many is no longer a small piece."""
 WIDE = 4.0
 """A patch is wide if its in-plane rms exceeds its thickness this many times."""
 FLAT = 8.0
@@ -74,16 +80,23 @@ def measure_surface(
     deviation = np.full(len(sample), np.nan)
     spacing = np.full(len(sample), np.nan)
     flat, size_of = np.zeros(len(sample), np.bool_), np.zeros(len(sample))
-    for count in NEIGHBOURS:
+    thickness = 0.0
+    enough = FEW_WIDE * len(sample)
+    for count in NEIGHBOURS + THICK:
         todo = np.flatnonzero(np.isnan(spread))
         size = min(count, len(points) - 1)
-        if len(todo) == 0:
+        if len(todo) == 0 or (count in THICK and (len(sample) - len(todo) > enough or PIECES * count > len(points))):
             break
+        if count in THICK:  # larger ones are fewer: each costs as much more
+            todo = np.arange(0, len(sample), 3 * count // THICK[0])
+            enough = 0.5 * len(todo)
         if size < 9:
             continue
         near, radius = _nearest(points, cells, starts, unit * 2.0**level, sample[todo], size)
         sd, width, narrow = quadric_spread(points[near])
         wide = width > WIDE * sd
+        if count in THICK:
+            thickness, spread[:] = float(np.median(sd)), np.nan  # of smaller patches only the thinnest are wide
         spread[todo[wide]] = sd[wide]
         flat[todo[wide]] = (width > FLAT * sd)[wide] & (narrow > 0.5 * FLAT * sd)[wide]
         size_of[todo[wide]] = radius[wide]
@@ -97,9 +110,12 @@ def measure_surface(
         return guess, guess, 0.1 * guess, Patches(np.empty(0, np.int64), np.empty(0), np.empty(0))
     typical, dense = np.quantile(spacing[known], [0.5, 0.1])
     good = np.isfinite(spread) & (spread > 1e-9 * typical)
+    flawless = np.isfinite(spread).any()
     clear = good & flat
     cores = deviation[np.isfinite(deviation)]
     noise = 1e-3 * typical  # noise-free surfaces still have a scale below which nothing is told apart
+    if not good.any() and not flawless:
+        noise = max(noise, thickness)  # of the largest patches, which do not look like surfaces; so it is at least that
     if good.any():
         plain, robust = half_sample_mode(spread[good]), half_sample_mode(cores + 1e-12 * typical)
         # heavy outliers blow up the plain estimate alone

@@ -121,6 +121,8 @@ SMALL_PATCH = 2.0
 ENOUGH_PATCHES = 5
 MOST_NOISE = 4.0
 """No surface is taken for this many times noisier than usual: it would be none."""
+TOO_FLAT = 1.5
+"""A window this many radii across that is flat shows no cylinder."""
 
 
 def cell_keys(cells: IndexArray) -> IndexArray:
@@ -267,12 +269,12 @@ class Ground:
         return usual * min(own, MOST_NOISE) if own > 1.2 else usual
 
     def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
-        """Tell which points may lie on a cylinder: those in flat windows of two radii belong to something flatter."""
+        """Tell which points may lie on a cylinder: those in large flat windows belong to something flatter."""
         return np.asarray(self.flatness[indices] < self.too_flat(radius), dtype=np.bool_)
 
     def too_flat(self, radius: float) -> float:
         """Give the flatness from which a point belongs to something flatter than a cylinder of this radius."""
-        return 2.0 * radius
+        return TOO_FLAT * radius
 
 
 @njit(cache=True, nogil=True)

@@ -28,6 +28,8 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 GROWTH_STEPS = 8
+DOUBT = 0.4
+"""A piece of the height that was found to belong before is asked for this share of what one beyond the ends is."""
 ROUGH = 0.02
 """While a cylinder grows, a fit may end at steps of this share of the spread."""
 ENOUGH = 6000
@@ -119,7 +121,7 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
             return "drifted away"
         spread = TUKEY_SPREAD * spread
         heights, angles = points_on(points, model, 3.0 * min(max(spread, noise), 2.0 * noise))
-        found = visible_extent(heights, angles, half, model[6])
+        found = visible_extent(heights, angles, half, model[6], doubt=DOUBT if step else 1.0)
         if found is None:
             return "too few points"
         low, high = found

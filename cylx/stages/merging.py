@@ -18,6 +18,10 @@ SAME_COSINE = math.cos(math.radians(4.0))
 RADIUS_RATIO = 0.75
 OFFSET = 0.3
 """Axes further apart than this, in radii, and four standard deviations are those of two pipes."""
+LOST = 1.0
+"""If the error is more than this many radii, a piece no longer says where its pipe goes on: that may be another."""
+IN_LINE = 9.5
+"""Chi-square of four angles, which one in twenty true pairs exceeds."""
 ENOUGH = 10000
 """Points of each piece that suffice to see whether one cylinder explains both."""
 CLAIMED = 0.5
@@ -114,6 +118,18 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
     return kept
 
 
+def _point_at_each_other(a: Finding, b: Finding) -> bool:
+    """Tell whether the line through the middles of two pieces has the direction of both, as well as these are known."""
+    across = b.segment.model[:3] - a.segment.model[:3]
+    distance = float(np.linalg.norm(across))
+    place = (a.offset_error**2 + b.offset_error**2) / distance**2
+    square = 0.0
+    for finding in (a, b):
+        sine = np.linalg.norm(np.cross(finding.segment.model[3:6], across)) / distance
+        square += float(sine) ** 2 / max(finding.tilt_error**2 + place, 1e-300)
+    return square < IN_LINE
+
+
 def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
     """Fit one cylinder to two pieces alike in direction and radius; None if it does not explain both."""
     one, two = a.segment, b.segment
@@ -121,13 +137,14 @@ def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | Non
     height = float(across @ one.model[3:6])
     apart = float(np.linalg.norm(across - height * one.model[3:6]))
     error = math.sqrt(a.offset_error**2 + b.offset_error**2 + (a.tilt_error * height) ** 2)
-    gap = abs(height) - one.half - two.half
-    if apart > OFFSET * one.model[6] + 4.0 * error or (
-        gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]
-    ):
+    if apart > OFFSET * one.model[6] + 4.0 * error:
         return None
+    gap, model = abs(height) - one.half - two.half, one.model.copy()
+    if gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]:
+        if error > LOST * one.model[6] or not _point_at_each_other(a, b):
+            return None
+        model[3:6] = across * math.copysign(1.0 / float(np.linalg.norm(across)), height)
     low, high = min(-one.half, height - two.half), max(one.half, height + two.half)
-    model = one.model.copy()
     model[:3] += 0.5 * (low + high) * model[3:6]
     half = 0.5 * (high - low)
     noise = ground.noise_about(one.model, one.half)

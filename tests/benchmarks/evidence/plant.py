@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from drafts import Sketch, finish, with_strays
-from solids import Elbow, Ellipsoid, RoundedBox, beam, lid, random_turn
+from solids import Elbow, Ellipsoid, RoundedBox, beam, lid, random_dents, random_turn, worn
 from visibility import scanned
 
 from cylx.geometry.cylinder import Cylinder
@@ -29,6 +29,8 @@ class Rack:
     starts: np.ndarray
     ends: np.ndarray
     radii: np.ndarray
+    rng: np.random.Generator
+    used: bool  # its pipes are out of round, and some are dented
 
     def is_free(self, start, end, radius, gap=0.01):
         return bool((segment_distances(start, end, self.starts, self.ends) > self.radii + radius + gap).all())
@@ -38,16 +40,23 @@ class Rack:
         along = end - start
         length = float(np.linalg.norm(along))
         shape = Cylinder(0.5 * (start + end), along, radius, length)
-        self.sketch.add_cylinder(shape, Mantle(shape, 0.0, 2 * np.pi))
+        self.sketch.add_cylinder(shape, self._mantle(shape))
         self.starts, self.ends = np.vstack([self.starts, start]), np.vstack([self.ends, end])
         self.radii = np.append(self.radii, radius)
         return shape
+
+    def _mantle(self, shape):
+        if not self.used:
+            return Mantle(shape, 0.0, 2 * np.pi)
+        oval, barrel = self.rng.uniform(0, 0.01), self.rng.uniform(-0.004, 0.004)
+        dents = random_dents(self.rng, shape.radius, shape.height, most=0.15) if self.rng.random() < 0.15 else ()
+        return worn(shape, 0.0, 2 * np.pi, oval, barrel, dents)
 
 
 def plant(rng, kind, seed, points=None):
     """Make a rack of pipes between I-beams, on a floor with clutter, scanned from four sides."""
     size = rng.uniform(1.8, 3.2)
-    rack = Rack(Sketch.empty(), np.empty((0, 3)), np.empty((0, 3)), np.empty(0))
+    rack = Rack(Sketch.empty(), np.empty((0, 3)), np.empty((0, 3)), np.empty(0), rng, used=rng.random() < 0.5)
     top = add_layers(rng, rack, size)
     for _ in range(rng.integers(0, 6)):
         add_riser(rng, rack, size, top)

@@ -12,12 +12,29 @@ from cylx.geometry.cylinder import Cylinder, axis_frame, cylinder_coordinates
 from cylx.synthetic.surfaces import Box, Mantle, Sphere, Wall, random_directions
 
 
+@dataclass(frozen=True, slots=True)
+class Dent:
+    """A hollow in a surface of revolution, as a blow leaves it: a bell, its depth a share of the radius."""
+
+    height: float
+    angle: float
+    depth: float
+    length: float  # standard deviation along the axis
+    width: float  # and about it, radians
+
+    def share(self, heights, angles):
+        """Give the depth at places, as a share of the radius there."""
+        about = (angles - self.angle + np.pi) % (2 * np.pi) - np.pi
+        bell = ((heights - self.height) / self.length) ** 2 + (about / self.width) ** 2
+        return self.depth * np.exp(-0.5 * bell)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Lathe:
     """A profile turned about an axis: cones, lids, shoulders of bottles, cups, bowls, cylinders that bulge.
 
     `heights` and `radii` are the corners of the profile; `first` and `arc` the part about the axis that is there;
-    `oval` the amplitude of an ovality, as a share of the radius.
+    `oval` the amplitude of an ovality, as a share of the radius; `dents` change radii, but normals not.
     """
 
     foot: np.ndarray
@@ -28,6 +45,7 @@ class Lathe:
     arc: float = 2 * np.pi
     oval: float = 0.0
     open: bool = False
+    dents: tuple = ()
 
     def _areas(self):
         run, rise = np.diff(self.radii), np.diff(self.heights)
@@ -46,7 +64,8 @@ class Lathe:
         share = np.where(straight, rng.random(n), (radii - low) / np.where(straight, 1.0, high - low))
         heights = self.heights[piece] + share * (self.heights[piece + 1] - self.heights[piece])
         angles = self.first + self.arc * rng.random(n)
-        return self.foot + _turned_about(self.direction, heights, radii * (1 + self.oval * np.cos(2 * angles)), angles)
+        shares = 1 + self.oval * np.cos(2 * angles) - sum(dent.share(heights, angles) for dent in self.dents)
+        return self.foot + _turned_about(self.direction, heights, radii * shares, angles)
 
     def normals(self, points):
         heights, distances, angles = cylinder_coordinates(points, self.foot, self.direction)
@@ -177,11 +196,25 @@ def lid(shape, end):
     return Lathe(foot, shape.direction, np.zeros(2), radii)
 
 
-def worn(shape, first, arc, oval, barrel):
-    """Make the mantle of a cylinder that is out of round by the share `oval` and bulges by the share `barrel`."""
+def worn(shape, first, arc, oval, barrel, dents=()):
+    """Make the mantle of a cylinder out of round by the share `oval`, that bulges by the share `barrel`, with dents."""
     along = np.linspace(-1, 1, 13)
     radii = shape.radius * (1 + barrel * (along**2 - 1 / 3))
-    return Lathe(shape.start, shape.direction, 0.5 * (along + 1) * shape.height, radii, first, arc, oval)
+    return Lathe(shape.start, shape.direction, 0.5 * (along + 1) * shape.height, radii, first, arc, oval, dents=dents)
+
+
+def random_dents(rng, radius, height, most):
+    """Draw one dent or two, as deep as the share `most` of the radius at the most."""
+    return tuple(
+        Dent(
+            rng.uniform(0, height),
+            rng.uniform(0, 2 * np.pi),
+            most * rng.uniform(0.1, 1.0),
+            radius * rng.uniform(0.15, 0.8),
+            rng.uniform(0.15, 0.6),
+        )
+        for _ in range(rng.integers(1, 3))
+    )
 
 
 def beam(middle, turn, length, width, depth, thickness):

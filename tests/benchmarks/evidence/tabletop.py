@@ -2,7 +2,7 @@
 
 import numpy as np
 from drafts import Sketch, finish
-from solids import Elbow, Ellipsoid, Lathe, RoundedBox, lid, random_turn
+from solids import Elbow, Ellipsoid, Lathe, RoundedBox, lid, random_dents, random_turn
 from visibility import scanned
 
 from cylx.geometry.cylinder import Cylinder, axis_frame
@@ -88,7 +88,7 @@ def can(rng, sketch, taken):
 
 
 def formed(rng, foot, direction, radius, height):
-    """Give the mantle of a real can: rims, ribs, a belly, a neck, a little out of round; about a hundredth in all."""
+    """Give the mantle of a real can: rims, ribs, a belly, a neck, a little out of round, by a hundredth; and dents."""
     heights = np.linspace(0.0, height, 90)
     along = heights / height
     share = rng.uniform(-0.006, 0.006) * (4 * (along - 0.5) ** 2 - 1 / 3)
@@ -101,7 +101,9 @@ def formed(rng, foot, direction, radius, height):
         share = share + rng.uniform(0.002, 0.012) * np.sin(2 * np.pi * heights / pitch) * ribbed
     if rng.random() < 0.2:
         share = share - rng.uniform(0.01, 0.12) * np.clip((along - 0.9) / 0.1, 0, 1)
-    return Lathe(foot, direction, heights, radius * (1 + share), oval=rng.uniform(0, 0.008), open=True)
+    oval = rng.uniform(0, 0.008)
+    dents = random_dents(rng, radius, height, most=0.2) if rng.random() < 0.25 else ()
+    return Lathe(foot, direction, heights, radius * (1 + share), oval=oval, open=True, dents=dents)
 
 
 def bottle(rng, sketch, taken):
