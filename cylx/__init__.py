@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cylx.errors import CylxError as CylxError
     from cylx.evaluation import compare as compare
     from cylx.evaluation import evaluate as evaluate
+    from cylx.fitting import fit_cylinder as fit_cylinder
     from cylx.geometry.cylinder import Cylinder as Cylinder
     from cylx.io import read_cloud as read_cloud
     from cylx.io import write_annotated as write_annotated
@@ -41,6 +42,7 @@ _HOMES = {
     "compare": "cylx.evaluation",
     "evaluate": "cylx.evaluation",
     "extract": "cylx.api",
+    "fit_cylinder": "cylx.fitting",
     "load_config": "cylx.config",
     "read_cloud": "cylx.io",
     "read_result": "cylx.api",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -188,6 +189,16 @@ class CylinderFit:
     evidence: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = None
     nominal: NominalRadius | None = None
+
+    @property
+    def radius_sd(self) -> float | None:
+        """Standard deviation of the radius, scene units; None if the covariance was not computed."""
+        return None if self.covariance is None else math.sqrt(max(float(self.covariance[4, 4]), 0.0))
+
+    @property
+    def angle_sd(self) -> float | None:
+        """Standard deviation of the direction of the axis, radians; None if the covariance was not computed."""
+        return None if self.covariance is None else math.sqrt(max(float(np.trace(self.covariance[2:4, 2:4])), 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
