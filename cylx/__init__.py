@@ -28,6 +28,10 @@ if TYPE_CHECKING:
     from cylx.records import Extraction as Extraction
     from cylx.records import PointCloud as PointCloud
     from cylx.records import Rejection as Rejection
+    from cylx.report import plot_radii as plot_radii
+    from cylx.report import plot_residuals as plot_residuals
+    from cylx.report import plot_scene as plot_scene
+    from cylx.report import show as show
     from cylx.results import Result as Result
 
 _HOMES = {
@@ -44,8 +48,12 @@ _HOMES = {
     "extract": "cylx.api",
     "fit_cylinder": "cylx.fitting",
     "load_config": "cylx.config",
+    "plot_radii": "cylx.report",
+    "plot_residuals": "cylx.report",
+    "plot_scene": "cylx.report",
     "read_cloud": "cylx.io",
     "read_result": "cylx.api",
+    "show": "cylx.report",
     "to_dataframe": "cylx.api",
     "to_dict": "cylx.api",
     "write_annotated": "cylx.io",

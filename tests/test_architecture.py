@@ -45,7 +45,7 @@ MAY_IMPORT = {
     "io": {"errors", "geometry", "open3d_door", "palette", "records"},
     "open3d_door": set(),
     "palette": set(),
-    "records": {"catalogue", "config", "geometry"},
+    "records": {"catalogue", "config", "cylx", "geometry"},
     "config": {"errors"},
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors"},

@@ -218,7 +218,7 @@ class Rejection:
     reason: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Extraction:
     """All that one run found out about one cloud.
 
@@ -255,6 +255,15 @@ class Extraction:
     config: Config
     warnings: tuple[str, ...] = ()
     rejected: tuple[Rejection, ...] = ()
+
+    def __repr__(self) -> str:
+        count = len(self.cylinders)
+        return f"{count} cylinder{'' if count == 1 else 's'} in {len(self.labels)} points"
+
+    def _repr_html_(self) -> str:
+        from cylx import show  # noqa: PLC0415  what shows records knows them, not they it
+
+        return show(self).html
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Give the cylinders as arrays, in their order.
