@@ -137,6 +137,7 @@ def maps_of(scenery: Scenery, most_cells: int = MOST_CELLS) -> list[dict[str, An
     maps = []
     for number, shape in enumerate(scenery.shapes):
         own = order[ends[number] : ends[number + 1]]
+        own = own[np.isfinite(scenery.residuals[own])]
         residuals = scenery.residuals[own].astype(np.float64)
         found = unroll(scenery.points[own], residuals, shape, scenery.noise, most_cells)
         rows, columns = found.means.shape

@@ -332,7 +332,7 @@ function selftest() {
     rows.at(-1).cells[2].click();
     told.selected = selected;
     told.heading = byId("details").querySelector("h2").textContent;
-    told.map = byId("details").querySelector(".map").width;
+    told.map = byId("details").querySelector(".map")?.width;
   }
   if (viewer) Object.assign(told, tryView());
   sortBy(0);

@@ -58,7 +58,7 @@ def plot_residuals(
     if not 0 <= cylinder < count:
         ids = f"its ids are 0 to {count - 1}" if count else "it has none"
         raise UsageError("cylinder", f"there is no cylinder {cylinder}", f"choose another; {ids}")
-    own = scenery.labels == cylinder
+    own = (scenery.labels == cylinder) & np.isfinite(scenery.residuals)
     if not own.any():
         remedy = "give the annotated cloud, as cylx.read_cloud('scan.annotated.ply')"
         raise UsageError("cloud", f"it has no points of cylinder {cylinder}", remedy)
@@ -130,7 +130,7 @@ def plot_radii(found: Extraction | Result, reference: Sequence[float] | None = N
         axes.axvline(0.0, color="grey", linewidth=0.8)
         axes.set_xlabel("radius less reference")
     axes.set_yticks(rows)
-    axes.set_ylim(len(radii) - 0.5, -0.5)
+    axes.set_ylim(max(len(radii), 1) - 0.5, -0.5)
     axes.set_ylabel("cylinder")
     axes.grid(axis="x", linewidth=0.4)
     axes.set_title("bars of two standard deviations", fontsize=10)
