@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from cylx.errors import CylxError as CylxError
     from cylx.evaluation import compare as compare
     from cylx.evaluation import evaluate as evaluate
+    from cylx.fitting import fit_cylinder as fit_cylinder
     from cylx.geometry.cylinder import Cylinder as Cylinder
     from cylx.io import read_cloud as read_cloud
     from cylx.io import write_annotated as write_annotated
@@ -27,6 +28,10 @@ if TYPE_CHECKING:
     from cylx.records import Extraction as Extraction
     from cylx.records import PointCloud as PointCloud
     from cylx.records import Rejection as Rejection
+    from cylx.report import plot_radii as plot_radii
+    from cylx.report import plot_residuals as plot_residuals
+    from cylx.report import plot_scene as plot_scene
+    from cylx.report import show as show
     from cylx.results import Result as Result
 
 _HOMES = {
@@ -41,9 +46,14 @@ _HOMES = {
     "compare": "cylx.evaluation",
     "evaluate": "cylx.evaluation",
     "extract": "cylx.api",
+    "fit_cylinder": "cylx.fitting",
     "load_config": "cylx.config",
+    "plot_radii": "cylx.report",
+    "plot_residuals": "cylx.report",
+    "plot_scene": "cylx.report",
     "read_cloud": "cylx.io",
     "read_result": "cylx.api",
+    "show": "cylx.report",
     "to_dataframe": "cylx.api",
     "to_dict": "cylx.api",
     "write_annotated": "cylx.io",

@@ -251,6 +251,15 @@ class Result(Part):
         drop_missing([content["input"]])
         return content | {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
 
+    def __repr__(self) -> str:
+        count = len(self.cylinders)
+        return f"{count} cylinder{'' if count == 1 else 's'} in {self.input.file!r}"
+
+    def _repr_html_(self) -> str:
+        from cylx import show  # noqa: PLC0415  what shows results knows them, not they it
+
+        return show(self).html
+
     def to_dataframe(self) -> Any:  # noqa: ANN401  pandas is an extra
         """Give the cylinders as a pandas data frame, its columns those of `cylx.tables.table_of`."""
         return dataframe_of([cylinder.to_object() for cylinder in self.cylinders])

@@ -10,9 +10,9 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
     "api", "baselines", "catalogue", "cli", "config", "consensus", "cylx", "diagnosis", "errors", "evaluation",
-    "evidence", "experiments", "export", "game", "geometry", "io", "json_parts", "measures", "noise", "open3d_door",
-    "palette", "payoff", "pipeline", "records", "rejections", "report", "results", "scene", "selection", "stages",
-    "synthetic", "tables",
+    "evidence", "experiments", "export", "fitting", "game", "geometry", "io", "json_parts", "measures", "noise",
+    "open3d_door", "palette", "payoff", "pipeline", "records", "rejections", "report", "results", "scene", "selection",
+    "stages", "synthetic", "tables",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},
@@ -22,6 +22,7 @@ MAY_IMPORT = {
     "diagnosis": {"api", "cylx", "open3d_door", "pipeline", "records", "synthetic"},
     "export": {"cylx", "errors", "geometry", "palette", "results", "tables"},
     "consensus": {"records"},
+    "fitting": {"errors", "geometry", "measures", "records", "scene"},
     "experiments": {"config", "cylx", "errors", "geometry", "open3d_door", "pipeline", "records", "synthetic"},
     "measures": {"geometry", "records"},
     "pipeline": {
@@ -44,7 +45,7 @@ MAY_IMPORT = {
     "io": {"errors", "geometry", "open3d_door", "palette", "records"},
     "open3d_door": set(),
     "palette": set(),
-    "records": {"catalogue", "config", "geometry"},
+    "records": {"catalogue", "config", "cylx", "geometry"},
     "config": {"errors"},
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -189,6 +190,16 @@ class CylinderFit:
     covariance: FloatArray | None = None
     nominal: NominalRadius | None = None
 
+    @property
+    def radius_sd(self) -> float | None:
+        """Standard deviation of the radius, scene units; None if the covariance was not computed."""
+        return None if self.covariance is None else math.sqrt(max(float(self.covariance[4, 4]), 0.0))
+
+    @property
+    def angle_sd(self) -> float | None:
+        """Standard deviation of the direction of the axis, radians; None if the covariance was not computed."""
+        return None if self.covariance is None else math.sqrt(max(float(np.trace(self.covariance[2:4, 2:4])), 0.0))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rejection:
@@ -207,7 +218,7 @@ class Rejection:
     reason: str
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Extraction:
     """All that one run found out about one cloud.
 
@@ -244,6 +255,15 @@ class Extraction:
     config: Config
     warnings: tuple[str, ...] = ()
     rejected: tuple[Rejection, ...] = ()
+
+    def __repr__(self) -> str:
+        count = len(self.cylinders)
+        return f"{count} cylinder{'' if count == 1 else 's'} in {len(self.labels)} points"
+
+    def _repr_html_(self) -> str:
+        from cylx import show  # noqa: PLC0415  what shows records knows them, not they it
+
+        return show(self).html
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Give the cylinders as arrays, in their order.

@@ -1,8 +1,20 @@
-"""A result to look at: a page that explains itself, and a picture."""
+"""A result to look at: a page that explains itself, pictures, and what a notebook shows."""
 
 from __future__ import annotations
 
+from cylx.report.figures import check_pictures
+from cylx.report.notebook import NotebookView, show
 from cylx.report.page import html_of
-from cylx.report.picture import check_pictures, png_of
+from cylx.report.picture import plot_scene, png_of
+from cylx.report.plots import plot_radii, plot_residuals
 
-__all__ = ["check_pictures", "html_of", "png_of"]
+__all__ = [
+    "NotebookView",
+    "check_pictures",
+    "html_of",
+    "plot_radii",
+    "plot_residuals",
+    "plot_scene",
+    "png_of",
+    "show",
+]

@@ -12,8 +12,9 @@ from cylx.config_text import plain_yaml
 from cylx.json_parts import drop_missing
 from cylx.palette import cylinder_colors
 from cylx.rejections import RejectedCylinder
-from cylx.report.maps import unroll
-from cylx.report.points import choose_points, original_colors, pack_labels, pack_residuals, quantise
+from cylx.report.maps import MOST_CELLS, unroll
+from cylx.report.points import choose_points, pack_labels, pack_residuals, quantise
+from cylx.report.scenery import Scenery
 from cylx.results import Result
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ def facts_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str
     """
     result = Result.of(extraction).to_object()
     del result["config"]
+    scenery = Scenery.of(extraction)
     table = extraction.cloud.table
     rejected = [RejectedCylinder.of(one).model_dump(mode="json") for one in extraction.rejected[:MOST_REJECTED]]
     drop_missing(rejected)
@@ -53,46 +55,58 @@ def facts_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str
         "fields": ["x", "y", "z"] if table is None else list(table.dtype.names or ()),
         "rejected": rejected,
         "rejected_count": len(extraction.rejected),
-        "view": _view(extraction, most_points),
-        "maps": _maps(extraction),
+        "view": view_of(scenery, most_points),
+        "maps": maps_of(scenery),
     }
 
 
-def _view(extraction: Extraction, most_points: int) -> dict[str, Any]:
-    """Give what is drawn: points, and cylinders relative to the middle of the box."""
-    cloud, fits = extraction.cloud, extraction.cylinders
-    chosen = choose_points(extraction.labels, most_points, np.random.default_rng(extraction.config.seed))
-    points = cloud.points[chosen]
-    steps, low, size = quantise(points)
+def view_of(scenery: Scenery, most_points: int) -> dict[str, Any]:
+    """Give what is drawn: points, and cylinders relative to the middle of the box.
+
+    Parameters
+    ----------
+    scenery : Scenery
+        With points, or with cylinders, or with both.
+    most_points : int
+        Most points drawn.
+
+    Returns
+    -------
+    dict
+        A JSON object, as `viewer.js` reads it.
+    """
+    chosen = choose_points(scenery.labels, most_points, np.random.default_rng(scenery.seed))
+    points, shapes = scenery.points[chosen], scenery.shapes
+    corners = points if len(points) else np.array([end for shape in shapes for end in (shape.start, shape.end)])
+    steps, low, size = quantise(corners)
     middle = low + 0.5 * size
-    unit = _unit(extraction)
-    labels = pack_labels(extraction.labels[chosen], len(fits))
-    colors = original_colors(cloud)
-    shapes = [[*(fit.cylinder.start - middle), *(fit.cylinder.end - middle), fit.cylinder.radius] for fit in fits]
+    unit = _unit(scenery)
+    labels = pack_labels(scenery.labels[chosen], len(shapes))
+    tubes = [[*(shape.start - middle), *(shape.end - middle), shape.radius] for shape in shapes]
     return {
         "count": len(chosen),
-        "total": len(cloud.points),
+        "total": len(scenery.points),
         "low": low.tolist(),
         "size": size.tolist(),
-        "home": _home(points - middle, np.array(shapes).reshape(-1, 7)),
-        "spacing": float(extraction.scene.spacing) * float(np.sqrt(len(cloud.points) / len(chosen))),
+        "home": _home(corners - middle, np.array(tubes).reshape(-1, 7)),
+        "spacing": scenery.spacing * float(np.sqrt(len(scenery.points) / max(len(chosen), 1))),
         "noise": unit,
         "noises": NOISES,
-        "points": _packed(steps),
+        "points": _packed(steps[: len(chosen)]),
         "labels": _packed(labels),
         "label_bytes": labels.itemsize,
-        "residuals": _packed(pack_residuals(extraction.residuals[chosen].astype(np.float64), NOISES * unit)),
-        "colors": None if colors is None else _packed(colors[chosen]),
-        "palette": _packed(cylinder_colors(np.arange(len(fits)))),
-        "cylinders": np.array(shapes).tolist(),
+        "residuals": _packed(pack_residuals(scenery.residuals[chosen].astype(np.float64), NOISES * unit)),
+        "colors": None if scenery.colors is None else _packed(scenery.colors[chosen]),
+        "palette": _packed(cylinder_colors(np.arange(len(shapes)))),
+        "cylinders": np.array(tubes).tolist(),
     }
 
 
-def _unit(extraction: Extraction) -> float:
+def _unit(scenery: Scenery) -> float:
     """Give the noise, or what stands for it where the points have none."""
-    residuals = extraction.residuals[np.isfinite(extraction.residuals)].astype(np.float64)
+    residuals = scenery.residuals[np.isfinite(scenery.residuals)].astype(np.float64)
     scatter = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else 0.0
-    return float(extraction.scene.noise) or scatter or 1.0
+    return scenery.noise or scatter or 1.0
 
 
 def _home(points: NDArray[np.float64], shapes: NDArray[np.float64]) -> dict[str, Any]:
@@ -104,15 +118,28 @@ def _home(points: NDArray[np.float64], shapes: NDArray[np.float64]) -> dict[str,
     return {"center": (0.5 * (low + high)).tolist(), "radius": float(np.linalg.norm(high - low) / 2) or 1.0}
 
 
-def _maps(extraction: Extraction) -> list[dict[str, Any]]:
-    """Unroll every cylinder, with all of its points."""
-    order = np.argsort(extraction.labels, kind="stable")
-    ends = np.searchsorted(extraction.labels[order], np.arange(len(extraction.cylinders) + 1))
+def maps_of(scenery: Scenery, most_cells: int = MOST_CELLS) -> list[dict[str, Any]]:
+    """Unroll every cylinder, with all of its points.
+
+    Parameters
+    ----------
+    scenery : Scenery
+    most_cells : int
+        Of one map.
+
+    Returns
+    -------
+    list of dict
+        A JSON object a cylinder, as `panels.js` reads it.
+    """
+    order = np.argsort(scenery.labels, kind="stable")
+    ends = np.searchsorted(scenery.labels[order], np.arange(len(scenery.shapes) + 1))
     maps = []
-    for number, fit in enumerate(extraction.cylinders):
+    for number, shape in enumerate(scenery.shapes):
         own = order[ends[number] : ends[number + 1]]
-        residuals = extraction.residuals[own].astype(np.float64)
-        found = unroll(extraction.cloud.points[own], residuals, fit.cylinder, float(extraction.scene.noise))
+        own = own[np.isfinite(scenery.residuals[own])]
+        residuals = scenery.residuals[own].astype(np.float64)
+        found = unroll(scenery.points[own], residuals, shape, scenery.noise, most_cells)
         rows, columns = found.means.shape
         maps.append(
             {

@@ -12,6 +12,7 @@ from cylx.geometry.cylinder import Cylinder, axis_frame, cylinder_coordinates
 FloatArray = NDArray[np.float64]
 
 MOST_COLUMNS, MOST_ROWS = 72, 48
+MOST_CELLS = MOST_COLUMNS * MOST_ROWS
 POINTS_A_CELL = 6
 EMPTY = -128
 
@@ -40,7 +41,9 @@ class ResidualMap:
     zero: str
 
 
-def unroll(points: FloatArray, residuals: FloatArray, cylinder: Cylinder, noise: float) -> ResidualMap:
+def unroll(
+    points: FloatArray, residuals: FloatArray, cylinder: Cylinder, noise: float, most_cells: int = MOST_CELLS
+) -> ResidualMap:
     """Average the residuals of a cylinder's points in cells of its surface, about square ones.
 
     Parameters
@@ -53,6 +56,8 @@ def unroll(points: FloatArray, residuals: FloatArray, cylinder: Cylinder, noise:
         Points beyond its ends are left out.
     noise : float
         Scene units.
+    most_cells : int
+        At least 8.
 
     Returns
     -------
@@ -61,7 +66,7 @@ def unroll(points: FloatArray, residuals: FloatArray, cylinder: Cylinder, noise:
     heights, _, angles = cylinder_coordinates(points, cylinder.point, cylinder.direction)
     zero, turn = _zero(cylinder)
     inside = np.abs(heights) <= 0.5 * cylinder.height * (1 + 1e-9) if cylinder.height else np.ones(len(points), bool)
-    columns, rows = _cells(cylinder, int(inside.sum()))
+    columns, rows = _cells(cylinder, int(inside.sum()), most_cells)
     column = ((angles[inside] - turn) / (2 * np.pi) + 0.5) % 1.0 * columns
     row = (heights[inside] / (cylinder.height or 1.0) + 0.5) * rows
     cell = np.clip(row.astype(int), 0, rows - 1) * columns + np.clip(column.astype(int), 0, columns - 1)
@@ -76,9 +81,9 @@ def unroll(points: FloatArray, residuals: FloatArray, cylinder: Cylinder, noise:
     return ResidualMap(packed.reshape(rows, columns), reach, limit, zero)
 
 
-def _cells(cylinder: Cylinder, count: int) -> tuple[int, int]:
+def _cells(cylinder: Cylinder, count: int, most: int) -> tuple[int, int]:
     """Give the columns and rows of a map: cells about square, with some points in each."""
-    cells = float(np.clip(count / POINTS_A_CELL, 8, MOST_COLUMNS * MOST_ROWS))
+    cells = float(np.clip(count / POINTS_A_CELL, 8, most))
     shape = 2 * np.pi * cylinder.radius / max(cylinder.height, 1e-9 * cylinder.radius)
     columns = int(np.clip(np.rint(np.sqrt(cells * shape)), 8, MOST_COLUMNS))
     return columns, int(np.clip(np.rint(cells / columns), 1, MOST_ROWS))

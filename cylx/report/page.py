@@ -32,12 +32,29 @@ def html_of(extraction: Extraction) -> str:
     str
         HTML, to be written as UTF-8.
     """
+    return page_of(facts_of(extraction))
+
+
+def page_of(facts: dict[str, Any]) -> str:
+    """Write the page of what is to be said.
+
+    Parameters
+    ----------
+    facts : dict
+        A JSON object, as `facts_of` gives it. With `embedded` it has neither `config`, `fields` nor `rejected`, and the
+        page is the view and the details alone, for a frame in another page.
+
+    Returns
+    -------
+    str
+        HTML, to be written as UTF-8.
+    """
     style, script = _read("viewer.css"), "\n".join(map(_read, ("viewer.js", "panels.js")))
     parts = {
         "policy": f"default-src 'none'; script-src '{_digest(script)}'; style-src '{_digest(style)}'; base-uri 'none'; "
         "form-action 'none'",
         "style": style,
-        "data": json_for_script(facts_of(extraction)),
+        "data": json_for_script(facts),
         "script": script,
     }
     pieces = re.split(r"\{\{(\w+)\}\}", _read("page.html"))  # at once: nothing in a part is looked at again

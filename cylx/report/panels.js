@@ -133,7 +133,7 @@ function showDetails() {
   const one = cylinders[selected];
   const place = byId("details");
   if (!one) {
-    const text = cylinders.length ? "Choose a cylinder in the table or in the view." : "No cylinder was found.";
+    const text = cylinders.length ? "Choose a cylinder." : "No cylinder was found.";
     place.replaceChildren(make("p", { className: "quiet" }, text));
     return;
   }
@@ -155,13 +155,14 @@ function showDetails() {
       uncertain(match.free_radius, match.free_radius_sd)],
   ]);
   const evidence = definitions(Object.entries(one.evidence ?? {}).map(([name, value]) => [name, number(value, 4)]));
+  const figures = maps.length ? [make("div", { className: "figures" }, mapFigure(one), ringFigure(one))] : [];
   place.replaceChildren(
     make("h2", {}, swatch, `Cylinder ${one.id}`),
-    make("div", { className: "figures" }, mapFigure(one), ringFigure(one)),
+    ...figures,
     values,
     ...(one.evidence ? [make("h3", {}, "Evidence"), evidence] : []),
   );
-  drawRing(place.querySelector(".ring"), one);
+  if (maps.length) drawRing(place.querySelector(".ring"), one);
 }
 
 /** Draw the unrolled residuals: round the cylinder from left to right, along its axis from bottom to top. */
@@ -309,10 +310,11 @@ function start() {
   byId("name").textContent = result.input.file;
   const points = view.count < view.total ? `${view.count} of ${view.total} points shown` : `${view.total} points`;
   byId("counts").textContent = `${count} cylinder${count === 1 ? "" : "s"}, ${points}`;
+  if (facts.embedded) document.body.classList.add("embedded");
   makeHeads();
   sortBy(0);
   openView();
-  makeSections();
+  if (!facts.embedded) makeSections();
   select(count ? 0 : -1);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", showDetails);
   if (location.hash === "#selftest") document.body.dataset.selftest = JSON.stringify(selftest());
@@ -330,7 +332,7 @@ function selftest() {
     rows.at(-1).cells[2].click();
     told.selected = selected;
     told.heading = byId("details").querySelector("h2").textContent;
-    told.map = byId("details").querySelector(".map").width;
+    told.map = byId("details").querySelector(".map")?.width;
   }
   if (viewer) Object.assign(told, tryView());
   sortBy(0);

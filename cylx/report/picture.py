@@ -9,34 +9,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.errors import UsageError
 from cylx.geometry.cylinder import Cylinder, axis_frame
-from cylx.json_parts import Input
 from cylx.palette import cylinder_colors
+from cylx.report.figures import new_figure
 from cylx.report.points import choose_points
+from cylx.report.scenery import Scenery
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction
+    from matplotlib.figure import Figure
+    from numpy.typing import ArrayLike
+
+    from cylx.records import Extraction, PointCloud
+    from cylx.results import Result
 
 MOST_POINTS = 60_000
 INCHES, DPI = (9.6, 7.2), 125
 ELEVATION, AZIMUTH = 25.0, -60.0
 _RULINGS, _AROUND = 4, 48
 _OUTLYING = 0.002
-
-
-def check_pictures() -> None:
-    """Refuse to draw where the drawing library is missing, before anything is computed.
-
-    Raises
-    ------
-    UsageError
-        If matplotlib is not installed.
-    """
-    try:
-        import matplotlib.figure  # noqa: F401, PLC0415  an extra
-    except ImportError:
-        raise UsageError("the picture", "matplotlib is not installed", "pip install 'cylx[plots]'") from None
 
 
 def png_of(extraction: Extraction) -> bytes:
@@ -57,32 +47,58 @@ def png_of(extraction: Extraction) -> bytes:
     UsageError
         If matplotlib is not installed.
     """
-    check_pictures()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
-
-    canvas = Figure(figsize=INCHES, dpi=DPI)
-    FigureCanvasAgg(canvas)
-    axes: Any = canvas.add_axes((0.02, 0.02, 0.94, 0.92), projection="3d", elev=ELEVATION, azim=AZIMUTH)
-    chosen = choose_points(extraction.labels, MOST_POINTS, np.random.default_rng(extraction.config.seed))
-    points, labels = extraction.cloud.points[chosen], extraction.labels[chosen]
-    low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
-    shown = ((points >= low) & (points <= high)).all(axis=1) | (labels >= 0)
-    colors = np.column_stack([cylinder_colors(labels[shown]) / 255.0, np.where(labels[shown] < 0, 0.5, 0.9)])
-    axes.scatter(*points[shown].T, c=colors, s=2.5, marker=".", linewidths=0, depthshade=False, rasterized=True)
-    for number, fit in enumerate(extraction.cylinders):
-        color = cylinder_colors(np.array([number]))[0] / 255.0 * 0.6
-        for line in outline(fit.cylinder):
-            axes.plot(*line.T, color=color, linewidth=1.0)
-    _frame(axes, points[shown] if shown.any() else points)
-    count = len(extraction.cylinders)
-    title = f"{_printable(Input.of(extraction).file)}: {count} cylinder{'' if count == 1 else 's'}"
-    canvas.suptitle(title, fontsize=13, parse_math=False)
     picture = io.BytesIO()
+    figure = plot_scene(extraction)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # letters of a name that the font has not
-        canvas.savefig(picture, format="png", dpi=DPI)
+        figure.savefig(picture, format="png", dpi=DPI)
     return picture.getvalue()
+
+
+def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> Figure:
+    """Draw points by cylinder, and the outlines of the cylinders, from obliquely above.
+
+    Parameters
+    ----------
+    found : Extraction or Result
+    cloud : PointCloud or array_like of shape (N, 3), optional
+        The points of a `Result`, as `read_cloud` gives them; those of the annotated cloud are coloured by cylinder.
+        An `Extraction` has its own.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Of 9.6 by 7.2 inches; `savefig` writes it, and a notebook shows it. At most 60 000 points are drawn.
+
+    Raises
+    ------
+    UsageError
+        If matplotlib is not installed, or a cloud is given with an extraction.
+    """
+    scenery = Scenery.of(found, cloud)
+    canvas = new_figure(INCHES, DPI)
+    axes: Any = canvas.add_axes((0.02, 0.02, 0.94, 0.92), projection="3d", elev=ELEVATION, azim=AZIMUTH)
+    chosen = choose_points(scenery.labels, MOST_POINTS, np.random.default_rng(scenery.seed))
+    points, labels = scenery.points[chosen], scenery.labels[chosen]
+    lines = [outline(shape) for shape in scenery.shapes]
+    if len(points):
+        low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
+        shown = ((points >= low) & (points <= high)).all(axis=1) | (labels >= 0)
+        colors = np.column_stack([cylinder_colors(labels[shown]) / 255.0, np.where(labels[shown] < 0, 0.5, 0.9)])
+        axes.scatter(*points[shown].T, c=colors, s=2.5, marker=".", linewidths=0, depthshade=False, rasterized=True)
+        points = points[shown] if shown.any() else points
+    elif lines:
+        points = np.concatenate([line for cylinder in lines for line in cylinder])
+    for number, cylinder in enumerate(lines):
+        color = cylinder_colors(np.array([number]))[0] / 255.0 * 0.6
+        for line in cylinder:
+            axes.plot(*line.T, color=color, linewidth=1.0)
+    if len(points):
+        _frame(axes, points)
+    count = len(scenery.shapes)
+    title = f"{_printable(scenery.name)}: {count} cylinder{'' if count == 1 else 's'}"
+    canvas.suptitle(title, fontsize=13, parse_math=False)
+    return canvas
 
 
 def outline(cylinder: Cylinder) -> list[NDArray[np.float64]]:

@@ -408,6 +408,7 @@ class Viewer {
     canvas.addEventListener("webglcontextrestored", () => this.build());
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("wheel", (event) => {
+      if (document.body.classList.contains("embedded") && document.activeElement !== canvas) return; // it scrolls the notebook
       event.preventDefault();
       this.zoom(Math.exp(Math.max(-0.5, Math.min(0.5, event.deltaY * (event.deltaMode ? 0.05 : 0.0015)))));
     }, { passive: false });

@@ -1,0 +1,59 @@
+"""Figures of matplotlib, which is an extra: made without a display and without the state of pyplot."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Literal
+
+from cylx.errors import UsageError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def check_pictures() -> None:
+    """Refuse to draw where the drawing library is missing, before anything is computed.
+
+    Raises
+    ------
+    UsageError
+        If matplotlib is not installed.
+    """
+    try:
+        import matplotlib.figure  # noqa: F401, PLC0415  an extra
+    except ImportError:
+        raise UsageError("the picture", "matplotlib is not installed", "pip install 'cylx[plots]'") from None
+
+
+def new_figure(inches: tuple[float, float], dpi: int, *, layout: Literal["constrained"] | None = None) -> Figure:
+    """Make an empty figure.
+
+    Parameters
+    ----------
+    inches : pair of float
+        Width and height.
+    dpi : int
+        Pixels an inch.
+    layout : {'constrained'}, optional
+        How its parts find their places; as they say by default.
+
+    Raises
+    ------
+    UsageError
+        If matplotlib is not installed.
+    """
+    check_pictures()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
+    from matplotlib.figure import Figure  # noqa: PLC0415
+
+    class ShownFigure(Figure):  # type: ignore[misc, unused-ignore]  # without matplotlib it has no types
+        """A figure that a notebook shows though pyplot does not know it."""
+
+        def _repr_png_(self) -> bytes:
+            picture = io.BytesIO()
+            self.savefig(picture, format="png")
+            return picture.getvalue()
+
+    figure = ShownFigure(figsize=inches, dpi=dpi, layout=layout)
+    FigureCanvasAgg(figure)
+    return figure

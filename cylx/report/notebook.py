@@ -1,0 +1,155 @@
+"""A result in a notebook: its cylinders as a table, and the view in 3-D of the page beside it.
+
+The table is plain HTML, which is all that is left where scripts are not trusted. The view is the page of a report, with
+fewer points and nothing but view and details, in a frame that has no access to the notebook.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cylx.palette import cylinder_colors
+from cylx.report.facts import maps_of, view_of
+from cylx.report.page import page_of
+from cylx.report.plots import with_deviation
+from cylx.report.scenery import Scenery
+from cylx.results import Result
+
+if TYPE_CHECKING:
+    from typing import Any
+
+    from numpy.typing import ArrayLike
+
+    from cylx.records import Extraction, PointCloud
+    from cylx.results import ResultCylinder
+
+MOST_POINTS = 30_000
+MOST_ROWS = 50
+MOST_CYLINDERS = 500
+"""Cylinders in the view; each takes about a kilobyte."""
+MOST_CELLS = 200_000
+"""Of the maps of all cylinders together."""
+ENOUGH = 1_000_000
+"""Points that are looked at; of larger clouds an even choice."""
+HEIGHT = 520
+
+
+@dataclass(frozen=True, slots=True)
+class NotebookView:
+    """What a notebook shows of a result.
+
+    Parameters
+    ----------
+    html : str
+        A table and a frame with a page; complete in itself.
+    text : str
+        One line, for where there is no HTML.
+    """
+
+    html: str
+    text: str
+
+    def _repr_html_(self) -> str:
+        return self.html
+
+    def __repr__(self) -> str:
+        return self.text
+
+
+def show(
+    found: Extraction | Result,
+    cloud: PointCloud | ArrayLike | None = None,
+    *,
+    most_points: int = MOST_POINTS,
+    height: int = HEIGHT,
+) -> NotebookView:
+    """Show a result in a notebook: a table of its cylinders, and a view in 3-D to turn and to click on.
+
+    An `Extraction` or a `Result` that ends a cell is shown like this, too. Nothing is loaded from anywhere; with the
+    points given here a notebook grows by about half a megabyte.
+
+    Parameters
+    ----------
+    found : Extraction or Result
+    cloud : PointCloud or array_like of shape (N, 3), optional
+        The points of a `Result`, as `read_cloud` gives them; those of the annotated cloud are coloured by cylinder.
+        Without it the cylinders are shown alone. An `Extraction` has its own.
+    most_points : int
+        Most points shown, >= 0; each puts about a dozen bytes into the notebook.
+    height : int
+        Of the view, pixels.
+
+    Returns
+    -------
+    NotebookView
+
+    Raises
+    ------
+    UsageError
+        If a cloud is given with an extraction.
+    ValueError
+        If the points have not the shape (N, 3).
+    """
+    scenery = Scenery.of(found, cloud)
+    result = found if isinstance(found, Result) else Result.of(found)
+    text = repr(found)
+    parts = [f"<div><strong>{_text(text)}</strong></div>", _table(result)]
+    if len(scenery.points) or scenery.shapes:
+        page = page_of(_glance(result, scenery.thinned(max(ENOUGH, most_points)), most_points))
+        style = f"width: 100%; height: {int(height)}px; border: 0"
+        frame = f"<iframe sandbox='allow-scripts' title='the cylinders in 3-D' style='{style}'"
+        parts.append(f"{frame} srcdoc='{escape(page)}'></iframe>")
+    return NotebookView("\n".join(parts), text)
+
+
+def _glance(result: Result, scenery: Scenery, most_points: int) -> dict[str, Any]:
+    """Gather what the page in the frame says: the result, and not how it came about."""
+    scenery = scenery.first(MOST_CYLINDERS)
+    count = len(scenery.shapes)
+    cylinders = [cylinder.to_object() for cylinder in result.cylinders[:count]]
+    for cylinder in cylinders:
+        cylinder.get("uncertainty", {}).pop("covariance", None)
+    content = result.model_copy(update={"cylinders": [], "stages": [], "warnings": [], "config": {}}).to_object()
+    return {
+        "embedded": True,
+        "result": {**content, "cylinders": cylinders},
+        "view": view_of(scenery, most_points),
+        "maps": maps_of(scenery, max(64, MOST_CELLS // max(count, 1))) if len(scenery.points) else [],
+    }
+
+
+def _table(result: Result) -> str:
+    """Write the table of the cylinders, as HTML."""
+    cylinders = result.cylinders
+    heads = ("id", "radius", "height", "coverage", "confidence")
+    lines = [_row(cylinder) for cylinder in cylinders[:MOST_ROWS]]
+    if len(cylinders) > MOST_ROWS:
+        rest = f"and {len(cylinders) - MOST_ROWS} more"
+        lines.append(f"<tr><td colspan='{len(heads)}'>{rest}</td></tr>")
+    if not lines:
+        return ""
+    head = "".join(f"<th>{name}</th>" for name in heads)
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+
+
+def _row(cylinder: ResultCylinder) -> str:
+    """Write a cylinder as a row of the table."""
+    red, green, blue = cylinder_colors(np.array([cylinder.id]))[0] if cylinder.id < MOST_CYLINDERS else (128,) * 3
+    deviation = cylinder.uncertainty.radius if cylinder.uncertainty else None
+    cells = (
+        f"<span style='color: rgb({red}, {green}, {blue})'>&#9632;</span> {cylinder.id}",
+        with_deviation(cylinder.radius, deviation),
+        f"{cylinder.height:.4g}",
+        f"{cylinder.coverage_deg:.0f}°",
+        "" if cylinder.confidence is None else f"{cylinder.confidence:.2f}",
+    )
+    return f"<tr>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def _text(text: str) -> str:
+    """Write a text as HTML; what cannot be shown, as half a pair of surrogates, is a question mark."""
+    return escape(text.encode("utf-8", "replace").decode("utf-8"))

@@ -1,0 +1,139 @@
+"""What there is to see of a result: cylinders, and points if they are at hand, whichever form the result has."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.errors import UsageError
+from cylx.geometry.cylinder import Cylinder
+from cylx.json_parts import Input
+from cylx.records import Extraction, PointCloud
+from cylx.report.points import original_colors
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from cylx.results import Result
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scenery:
+    """Cylinders and the points about them.
+
+    Parameters
+    ----------
+    name : str
+        Of the cloud.
+    shapes : tuple of Cylinder
+        Scene units; the index is the `id`.
+    points : ndarray of shape (N, 3)
+        Scene units; none if they are not at hand.
+    labels : ndarray of shape (N,), int32
+        Cylinder of each point, -1 for none.
+    residuals : ndarray of shape (N,), float32
+        Signed distance to it, + is outside, scene units; NaN where unknown.
+    colors : ndarray of shape (N, 3), uint8, or None
+        That the points came with.
+    spacing, noise : float
+        Of the scene, scene units.
+    seed : int
+        Of the choice of points.
+    """
+
+    name: str
+    shapes: tuple[Cylinder, ...]
+    points: FloatArray
+    labels: NDArray[np.int32]
+    residuals: NDArray[np.float32]
+    colors: NDArray[np.uint8] | None
+    spacing: float
+    noise: float
+    seed: int = 0
+
+    @classmethod
+    def of(cls, found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> Scenery:
+        """Put together what there is to see.
+
+        Parameters
+        ----------
+        found : Extraction or Result
+        cloud : PointCloud or array_like of shape (N, 3), optional
+            The points of a `Result`. Those of an annotated cloud have their cylinders and residuals; those of any other
+            have none. An `Extraction` has its own.
+
+        Raises
+        ------
+        UsageError
+            If both the extraction and the caller bring points.
+        ValueError
+            If the points have not the shape (N, 3).
+        """
+        if isinstance(found, Extraction):
+            if cloud is not None:
+                raise UsageError("cloud", "an extraction has its points already", "leave the cloud out")
+            return cls(
+                Input.of(found).file,
+                tuple(fit.cylinder for fit in found.cylinders),
+                found.cloud.points,
+                found.labels,
+                found.residuals,
+                original_colors(found.cloud),
+                float(found.scene.spacing),
+                float(found.scene.noise),
+                found.config.seed,
+            )
+        if cloud is None:
+            cloud = PointCloud(np.empty((0, 3)))
+        elif not isinstance(cloud, PointCloud):
+            cloud = PointCloud.from_array(cloud)
+        shapes = tuple(
+            Cylinder(np.array(one.axis_point), np.array(one.axis_direction), one.radius, one.height)
+            for one in found.cylinders
+        )
+        labels, residuals = _annotations(cloud, len(shapes))
+        colors = original_colors(cloud)
+        scale = found.scene
+        return cls(found.input.file, shapes, cloud.points, labels, residuals, colors, scale.spacing, scale.noise)
+
+    def thinned(self, most: int) -> Scenery:
+        """Give about `most` of the points, at equal steps of their order."""
+        step = max(1, len(self.points) // max(most, 1))
+        if step == 1:
+            return self
+        colors = None if self.colors is None else self.colors[::step]
+        return replace(
+            self,
+            points=self.points[::step],
+            labels=self.labels[::step],
+            residuals=self.residuals[::step],
+            colors=colors,
+            spacing=self.spacing * math.sqrt(step),
+        )
+
+    def first(self, count: int) -> Scenery:
+        """Give the first cylinders and all points; those of other cylinders are of none."""
+        if len(self.shapes) <= count:
+            return self
+        labels = np.where(self.labels < count, self.labels, -1).astype(np.int32)
+        return replace(self, shapes=self.shapes[:count], labels=labels)
+
+
+def _annotations(cloud: PointCloud, count: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Read cylinder and residual of each point out of an annotated cloud; -1 and NaN where it has none."""
+    labels, residuals = np.full(len(cloud.points), -1, np.int32), np.full(len(cloud.points), np.nan, np.float32)
+    rows: Any = slice(None) if cloud.valid is None else cloud.valid
+    table = cloud.table
+    if table is None or not {"cylinder_id", "residual"} <= set(table.dtype.names or ()):
+        return labels, residuals
+    ids = np.asarray(table["cylinder_id"][rows])
+    known = (ids >= 0) & (ids < count)
+    labels[known] = ids[known]
+    residuals[known] = table["residual"][rows][known]
+    return labels, residuals
