@@ -1,10 +1,11 @@
-"""The parts of the documentation that are written from the code: options, configuration keys, result keys, rooms,
-arrows.
+"""The parts of the documentation that are written from the code: options, configuration keys, result keys, public
+names, rooms, arrows.
 
 Each function in `TABLES` gives the text between `<!-- generated: NAME -->` and `<!-- end -->` on a page.
 """
 
 import ast
+import inspect
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 import click
 from test_architecture import EVERYTHING, MAY_IMPORT
 
+import cylx
 from cylx.cli import main
 from cylx.config import Config, load_config
 from cylx.config_text import _allowed, _scalar
@@ -220,6 +222,68 @@ def rejected_format():
     return json_format(rejections_schema(), known=[name for name, _, _ in parts_of(result_schema()) if name])
 
 
+# --- the Python interface
+
+
+def first_paragraph(thing):
+    """Give the first paragraph of a docstring on one line."""
+    return " ".join(inspect.getdoc(thing).split("\n\n")[0].split())
+
+
+def sections_of(thing):
+    """Give the sections of a numpydoc docstring that list things: (name, type) and sentence of each, by heading."""
+    parts = re.split(r"^(\w+)\n-+$", inspect.getdoc(thing), flags=re.MULTILINE)
+    for heading, text in zip(parts[1::2], parts[2::2], strict=True):
+        if heading in {"Parameters", "Returns", "Raises"}:
+            entries = re.findall(r"^(\S.*)\n?((?:(?: +.*)?\n)*)", text.strip("\n") + "\n", re.MULTILINE)
+            yield heading, [(name.partition(" : "), " ".join(told.split())) for name, told in entries]
+
+
+def call_of(name, thing):
+    """Write the call of a function or a class, without types, and without defaults that are no plain values."""
+    parameters = []
+    for parameter in inspect.signature(thing).parameters.values():
+        plain = parameter.default in (parameter.empty, None) or isinstance(parameter.default, int | float | str | tuple)
+        parameters.append(parameter.replace(annotation=parameter.empty, default=parameter.default if plain else ...))
+    return f"`{name}{inspect.Signature(parameters)}`".replace("Ellipsis", "...")
+
+
+def methods_of(thing):
+    """Give the public methods and properties of a class that are its own, with what they say of themselves."""
+    for name, value in vars(thing).items():
+        method = value.__func__ if isinstance(value, classmethod | staticmethod) else value
+        ours = inspect.isfunction(method) or isinstance(method, property)
+        if ours and not name.startswith("_"):
+            yield f"{name}{'' if isinstance(method, property) else '()'}", first_paragraph(method)
+
+
+def section(heading, entries):
+    """Write what a section of a docstring lists."""
+    if not any(told for _, told in entries):
+        names = ", ".join(f"`{name}`{' ' * bool(kind)}{kind}" for (name, _, kind), _ in entries)
+        return f"{heading.removesuffix('s')}: {names}."
+    if any(kind for (_, _, kind), _ in entries):
+        rows = [[f"`{name}`", kind, told] for (name, _, kind), told in entries]
+        return table([heading.lower().removesuffix("s"), "type", "meaning"], rows)
+    return table([heading.lower(), "meaning"], [[f"`{name}`", told] for (name, _, _), told in entries])
+
+
+def python():
+    """Write every public name with its parameters."""
+    names = [name for name in cylx.__all__ if name != "__version__"]
+    parts = []
+    for name in sorted(names, key=lambda name: (inspect.isclass(getattr(cylx, name)), name)):
+        thing = getattr(cylx, name)
+        parts.append(f"### {name}")
+        if "Parameters" in dict(sections_of(thing)):
+            parts.append(call_of(name, thing))
+        parts.append(first_paragraph(thing))
+        parts += [section(heading, entries) for heading, entries in sections_of(thing)]
+        if inspect.isclass(thing) and (methods := list(methods_of(thing))):
+            parts.append(table(["name", "what it is"], [[f"`{method}`", told] for method, told in methods]))
+    return "\n\n".join(parts)
+
+
 # --- the house
 
 COMMENTS = {".js": r"^// (.*)$", ".css": r"^/\* (.*) \*/$", ".html": r"^<!-- (.*) -->$"}
@@ -268,6 +332,7 @@ TABLES = {
     "command line": command_line,
     "json format": json_format,
     "rejected format": rejected_format,
+    "python": python,
     "rooms": rooms,
     "arrows": arrows,
 }

@@ -1,5 +1,6 @@
 """The documentation says what the code does: every command, key, file, equation and link."""
 
+import ast
 import importlib
 import inspect
 import json
@@ -7,6 +8,7 @@ import re
 
 import click
 import pytest
+import yaml
 from docs_tables import PACKAGE, TABLES, TOLD, commands, config_keys, config_sections, options_of
 
 from cylx import errors, evidence
@@ -273,6 +275,33 @@ def files_of(block):
 def test_the_index_leads_to_every_page():
     links = set(re.findall(r"\]\(([\w-]+\.md)\)", read("docs/README.md")))
     assert {path.name for path in DOCS.glob("*.md")} - {"README.md"} <= links
+
+
+def nav_pages(entries):
+    """Give the pages of a part of the navigation, in their order."""
+    for entry in entries:
+        place = next(iter(entry.values())) if isinstance(entry, dict) else entry
+        yield from nav_pages(place) if isinstance(place, list) else [place]
+
+
+def papers():
+    """Give the files outside docs/ that are pages of the site, by their paths: `PAPERS` of its hooks, read not run."""
+    tree = ast.parse(read(".ci/site/hooks.py"))
+    (value,) = (node.value for node in tree.body if isinstance(node, ast.Assign) and node.targets[0].id == "PAPERS")
+    return ast.literal_eval(value)
+
+
+def test_the_navigation_of_the_site_has_every_page_once():
+    found = list(nav_pages(yaml.safe_load(read(".mkdocs.yml"))["nav"]))
+    assert sorted(found) == sorted([*(path.name for path in DOCS.glob("*.md")), *papers().values()])
+    assert all((ROOT / path).is_file() for path in papers())
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_every_page_that_is_linked_to_is_in_the_site(path):
+    for target in re.findall(r"\]\((?!https?:|#)([^)\s#]+)", path.read_text(encoding="utf-8")):
+        there = (path.parent / target).resolve().relative_to(ROOT)
+        assert there.parts[0] == "docs" or there.as_posix() in papers(), target
 
 
 def anchors(text):
