@@ -77,9 +77,13 @@ def test_nothing_and_a_few_points_are_no_cylinder():
 @pytest.mark.parametrize("taper_deg", [3.0, 8.0])
 def test_a_cone_shows_its_slope(taper_deg):
     slope = np.tan(np.radians(taper_deg))
-    verdict = judge(noisy(Frustum(np.zeros(3), UP, 1 - slope / 2, 1 + slope / 2, 1.0)), half=0.5)
-    assert np.isclose(abs(verdict.measures["slope"]), slope, rtol=0.4)
+    ground, segment = world(noisy(Frustum(np.zeros(3), UP, 1 - slope / 2, 1 + slope / 2, 1.0)), half=0.5)
+    verdict = verify(segment, ground, 0.8, (40, 42), VerificationConfig())
+    assert np.isclose(verdict.measures["slope"], slope, rtol=0.4)
     assert verdict.reason != ""
+    segment.model[3:6] *= -1.0  # the result has the upward direction all the same
+    turned = verify(segment, ground, 0.8, (40, 42), VerificationConfig())
+    assert np.isclose(turned.measures["slope"], verdict.measures["slope"], rtol=1e-6)
 
 
 def test_a_strip_of_a_sphere_shows_its_bulge():

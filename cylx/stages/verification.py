@@ -99,6 +99,7 @@ def verify(
     lack, structure = lack_of_fit(shell, deviation)
     inside, outside = emptiness(shell, radius)
     consistent, near = counts
+    along = np.sign(segment.model[3 + int(np.abs(segment.model[3:6]).argmax())])  # as the result has the direction
     measures = {
         "noise_ratio": deviation / noise,
         "lack_of_fit": lack,
@@ -109,7 +110,7 @@ def verify(
         "tangent": continuation(shell, radius),
         "places": distinct_places(shell.angles[shell.on], radius, deviation),
         "curvature": shape["curvature"],
-        "slope": shape["slope"],
+        "slope": shape["slope"] * along,
         "slope_error": shape["slope_error"],
         "bulge": shape["bulge"],
         "bulge_error": shape["bulge_error"],
