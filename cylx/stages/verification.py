@@ -99,7 +99,7 @@ def verify(
     lack, structure = lack_of_fit(shell, deviation)
     inside, outside = emptiness(shell, radius)
     consistent, near = counts
-    along = np.sign(segment.model[3 + int(np.abs(segment.model[3:6]).argmax())])  # as the result has the direction
+    along = math.copysign(1.0, segment.model[3 + int(np.abs(segment.model[3:6]).argmax())])  # as the result has it
     measures = {
         "noise_ratio": deviation / noise,
         "lack_of_fit": lack,
