@@ -217,7 +217,7 @@ def _strays(points: FloatArray) -> Caution | None:
 
 
 def _flat(points: FloatArray, scene: Scene) -> Caution | None:
-    """Notice a cloud that is one plane but for its noise; what is thin and bent can look like noise above the spacing."""
+    """Notice a cloud that is one plane but for its noise, which bent things can look like if they are thin."""
     if scene.noise > scene.spacing:
         return None
     offsets = points - points.mean(axis=0)
