@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.failures import tell
+from cylx.cli.failures import answer, tell
 from cylx.cli.group import ExampleCommand
 from cylx.cli.meshes import drawing_of, remarks_on, units_option
-from cylx.cli.options import complete_files, debug_option, overwrite_option
+from cylx.cli.options import complete_files, debug_option, json_option, overwrite_option
 from cylx.cli.outputs import check_apart
 from cylx.cli.staging import write_together
+from cylx.cli.summary import legible
 from cylx.errors import InputError
 
 if TYPE_CHECKING:
@@ -33,9 +35,16 @@ if TYPE_CHECKING:
 @units_option(".glb, .step, .ifc and .dxf need")
 @click.option("--min-confidence", type=click.FloatRange(0, 1), metavar="X", help="Leave out what is less sure.")
 @overwrite_option
+@json_option
 @debug_option
 def export(
-    *, result: str, outputs: tuple[str, ...], units: str | None, min_confidence: float | None, overwrite: bool
+    *,
+    result: str,
+    outputs: tuple[str, ...],
+    units: str | None,
+    min_confidence: float | None,
+    overwrite: bool,
+    as_json: bool,
 ) -> None:
     """Write the cylinders of RESULT for other programs.
 
@@ -54,6 +63,22 @@ def export(
     written = {name: render(drawing, known, name) for name, known in formats.items()}
     write_together({name: exported.data for name, exported in written.items()}, overwrite=overwrite)
     _report(result, drawing, written)
+    if as_json:
+        answer(json.dumps(_told(result, drawing, written), indent=2, ensure_ascii=False) + "\n")
+
+
+def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[str, Any]:
+    """Say what was written, for programs."""
+    return {
+        "result": legible(result),
+        "cylinders": len(drawing.cylinders),
+        "flat": drawing.flat,
+        "units": drawing.unit,
+        "files": [
+            {"file": legible(name), "bytes": len(exported.data), "offset": exported.offset}
+            for name, exported in written.items()
+        ],
+    }
 
 
 def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing:

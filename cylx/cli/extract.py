@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     "--output",
     metavar="FILE",
     shell_complete=complete_files,
-    help="The JSON; - for standard output, or a folder.  [default: beside the scan]",
+    help="The JSON; - for standard output, as --json elsewhere, or a folder.  [default: beside the scan]",
 )
 @click.option(
     "--annotate/--no-annotate",
