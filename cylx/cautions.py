@@ -71,8 +71,10 @@ def cautions(whole: PointCloud, cloud: PointCloud, scene: Scene, least: int) -> 
         Fewest points that a cylinder is accepted with.
     """
     points = cloud.points
-    found = [_missing(whole), _few(points, least), *damage(cloud, scene), _strays(points), _flat(points, scene)]
-    return [caution for caution in (*found, _degrees(points)) if caution is not None]
+    bent = _degrees(points)
+    found = [_missing(whole), _few(points, least), *damage(cloud, scene), _strays(points), bent]
+    found.append(None if bent else _flat(points, scene))
+    return [caution for caution in found if caution is not None]
 
 
 def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
