@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, get_args
 from pydantic import Field, ValidationError, model_validator
 
 from cylx.config_baselines import JinConfig, LineFitConfig, MsacConfig, TranConfig
-from cylx.config_faults import describe_fault
+from cylx.config_faults import describe_faults
 from cylx.config_layers import Layer, file_layer, merge, nested, override_layer, preset_layer
 from cylx.config_sections import (
     AveragingConfig,
@@ -194,7 +194,10 @@ def _validate(values: dict[str, Any], layers: Sequence[Layer]) -> Config:
     try:
         return Config.model_validate(values)
     except ValidationError as error:
-        path, fault, remedy = describe_fault(error, Config)
+        faults = describe_faults(error, Config)
+        path, fault, remedy = faults[0]
         prefixes = [layer.prefix for layer in layers if not path or path[0] in layer.values]
         place = (prefixes[-1] if prefixes else "") + ".".join(path)
-        raise ConfigError(place.removesuffix(": ") or "configuration", fault, remedy) from None
+        failure = ConfigError(place.removesuffix(": ") or "configuration", fault, remedy)
+        failure.faults = tuple((".".join(path), fault, remedy) for path, fault, remedy in faults)
+        raise failure from None

@@ -48,9 +48,17 @@ def describe_fault(error: ValidationError, model: type[BaseModel]) -> tuple[tupl
     fault, remedy : str
         What is wrong, and what to do about it.
     """
-    details = error.errors(include_url=False)[0]
-    path = tuple(str(part) for part in details["loc"])
-    return path, *_fault_and_remedy(details, path, model)
+    return describe_faults(error, model)[0]
+
+
+def describe_faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple[str, ...], str, str]]:
+    """Say what all faults of a failed validation are, one of each path, as `describe_fault` does of the first."""
+    found: dict[tuple[str, ...], tuple[str, str]] = {}
+    for details in error.errors(include_url=False):
+        path = tuple(str(part) for part in details["loc"])
+        if path not in found:
+            found[path] = _fault_and_remedy(details, path, model)
+    return [(path, *words) for path, words in found.items()]
 
 
 def dotted_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:

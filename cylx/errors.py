@@ -39,7 +39,13 @@ class UsageError(CylxError):
 
 
 class ConfigError(UsageError):
-    """A configuration that has an unknown key, a wrong type or an impossible value."""
+    """A configuration that has an unknown key, a wrong type or an impossible value.
+
+    `faults` are all that are known, each a dotted path, what is wrong there, and what to do about it; the error itself
+    tells of the first.
+    """
+
+    faults: tuple[tuple[str, str, str], ...] = ()
 
 
 class InputError(CylxError):

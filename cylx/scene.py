@@ -259,7 +259,7 @@ def resolve(config: Config, scene: Scene) -> Config:
         "scene": {
             "spacing": scene.spacing,
             "noise": scene.noise,
-            "radius_min": least or min(max(3.0 * scene.noise, 0.25 * scene.spacing), greatest or math.inf),
+            "radius_min": least or min(thinnest(scene)[0], greatest or math.inf),
             "radius_max": greatest or max(0.5 * scene.extent, least or 0.0),
             "known_radius_sd": config.scene.known_radius_sd or (radius and 1e-3 * radius),
             "catalogue": catalogue and [entry.model_copy(update={"tolerance": entry.spread}) for entry in catalogue],
@@ -273,6 +273,21 @@ def resolve(config: Config, scene: Scene) -> Config:
     return config.model_copy(
         update={name: getattr(config, name).model_copy(update=values) for name, values in known.items()}
     )
+
+
+def thinnest(scene: Scene) -> tuple[float, float]:
+    """Give the least radius that is looked for, and that from which a cylinder that stands free is found as a rule.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    looked_for, found : float
+        Scene units.
+    """
+    return max(3.0 * scene.noise, 0.25 * scene.spacing), max(6.0 * scene.noise, 0.5 * scene.spacing)
 
 
 def radius_range(config: Config, frame: Frame) -> tuple[float, float]:

@@ -23,6 +23,15 @@ def pytest_addoption(parser):
     parser.addoption("--regen", action="store_true", help="Write the golden results anew; read the diff.")
 
 
+def pytest_xdist_auto_num_workers(config):
+    """Give a worker for each core; none where few tests were asked for, which would wait for it, or where files of ours
+    are written, which is done one after the other."""
+    few = config.args_source is config.ArgsSource.ARGS and len(config.args) < 4
+    if few or config.option.keyword or config.option.regen:
+        return 0
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
 @pytest.fixture
 def run_cylx():
     """Run the command line in this process: `run_cylx("info", path)` gives exit_code, stdout and stderr."""

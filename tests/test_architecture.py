@@ -9,8 +9,9 @@ PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 EVERYTHING = {
-    "api", "baselines", "catalogue", "cli", "config", "consensus", "cylx", "diagnosis", "errors", "evaluation",
-    "evidence", "experiments", "export", "fitting", "game", "geometry", "io", "json_parts", "measures", "noise",
+    "api", "baselines", "catalogue", "cautions", "cli", "config", "consensus", "cylx", "diagnosis", "errors",
+    "evaluation", "evidence", "experiments", "export", "fitting", "game", "geometry", "io", "json_parts", "measures",
+    "noise",
     "open3d_door", "palette", "payoff", "pipeline", "records", "rejections", "report", "results", "scene", "selection",
     "stages", "synthetic", "tables",
 }  # fmt: skip
@@ -26,8 +27,8 @@ MAY_IMPORT = {
     "experiments": {"config", "cylx", "errors", "geometry", "open3d_door", "pipeline", "records", "synthetic"},
     "measures": {"geometry", "records"},
     "pipeline": {
-        "baselines", "catalogue", "config", "consensus", "errors", "game", "geometry", "measures", "records", "scene",
-        "stages",
+        "baselines", "catalogue", "cautions", "config", "consensus", "errors", "game", "geometry", "measures",
+        "records", "scene", "stages",
     },
     "baselines": {"config", "errors", "geometry", "measures", "open3d_door", "records"},
     "stages": {
@@ -50,6 +51,7 @@ MAY_IMPORT = {
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors"},
     "catalogue": set(),
+    "cautions": {"records"},
     "evidence": set(),
     "geometry": set(),
     "game": set(),

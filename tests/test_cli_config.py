@@ -55,6 +55,40 @@ def test_check_says_yes(run_cylx, tmp_path):
     assert (done.exit_code, done.stdout, done.stderr) == (0, f"{path}: valid, preset paper\n", "")
 
 
+def test_check_says_so_to_programs(run_cylx, tmp_path):
+    path = tmp_path / "my.yaml"
+    path.write_text("preset: paper")
+    done = run_cylx("config", "check", path, "--json")
+    assert json.loads(done.stdout) == {"file": str(path), "valid": True, "preset": "paper", "faults": []}
+    assert (done.exit_code, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("text", "places"),
+    [
+        (
+            "slicing: {thicknes: 3, planes: -1}\nscene: {axis: up}",
+            [("scene.axis", None), ("slicing.planes", None), ("slicing.thicknes", None)],
+        ),
+        ("scene: {axis_sd_deg: 3}", [("scene.axis_sd_deg", None)]),
+        ("seed: 1\nseed: 2", [(None, 2)]),
+        ("- 1", [(None, None)]),
+        (None, [(None, None)]),
+    ],
+)
+def test_check_gives_programs_all_faults(run_cylx, tmp_path, text, places):
+    path = tmp_path / "my.yaml"
+    if text is not None:
+        path.write_text(text)
+    failed, plain = run_cylx("config", "check", path, "--json"), run_cylx("config", "check", path)
+    answer = json.loads(failed.stdout)
+    assert (answer["valid"], answer["preset"]) == (False, None)
+    assert [(fault["key"], fault["line"]) for fault in answer["faults"]] == places
+    first = answer["faults"][0]
+    assert failed.stderr.endswith(f": {first['fault']}; {first['remedy']}\n")
+    assert (failed.exit_code, failed.stderr, plain.stdout) == (2, plain.stderr, "")
+
+
 @pytest.mark.parametrize(
     ("text", "fault"),
     [

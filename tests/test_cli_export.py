@@ -30,6 +30,22 @@ def test_a_table_and_a_mesh_are_written(run_cylx, tmp_path):
     assert (tmp_path / "a.OBJ").read_text(encoding="utf-8").count("\no cylinder ") == 6
 
 
+def test_programs_are_told_what_was_written(run_cylx, tmp_path, result):
+    pytest.importorskip("trimesh", reason="needs cylx[mesh]")
+    for cylinder in result["cylinders"]:
+        cylinder["axis_point"][1] += 5e6
+    result["cylinders"][1]["height"] = 0.0
+    (tmp_path / "r.json").write_text(json.dumps(result), encoding="utf-8")
+    names = [str(tmp_path / "a.csv"), str(tmp_path / "a.stl")]
+    done = run_cylx("export", tmp_path / "r.json", *names, "--units", "mm", "--json")
+    answer = json.loads(done.stdout)
+    files = answer.pop("files")
+    assert answer == {"result": str(tmp_path / "r.json"), "cylinders": 6, "flat": [1], "units": "mm"}
+    assert [file["file"] for file in files] == names
+    assert [file["bytes"] for file in files] == [Path(name).stat().st_size for name in names]
+    assert (files[0]["offset"], files[1]["offset"][1] // 10) == (None, 500000)
+
+
 def test_what_is_less_sure_is_left_out(run_cylx, tmp_path, result):
     result["cylinders"][2]["confidence"] = 0.5
     (tmp_path / "r.json").write_text(json.dumps(result), encoding="utf-8")

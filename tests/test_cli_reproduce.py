@@ -1,5 +1,6 @@
 """`cylx reproduce`: tables, pictures, what is gone on with, exit codes."""
 
+import json
 import sys
 
 import numpy as np
@@ -84,6 +85,19 @@ def test_the_table_and_the_conversation(run_cylx, tmp_path, small, at_once):
     assert [row[:7] for row in rows if row and row[0] in {"jin", "line-fit"}] == [
         [cell.curve, "0.01", "3", "1.00", "1.5", "±", "0.6"] for cell in small
     ]
+
+
+def test_json_has_the_means(run_cylx, tmp_path, small, at_once):
+    done = run_cylx("reproduce", 7, "--trials", 3, "--jobs", 2, "--out", tmp_path, "--json")
+    (figure,) = json.loads(done.stdout)["figures"]
+    assert (done.exit_code, figure["figure"]) == (0, 7)
+    assert [(cell["panel"], cell["curve"], cell["x"]) for cell in figure["cells"]] == [
+        (cell.panel, cell.curve, cell.x) for cell in small
+    ]
+    for cell in figure["cells"]:
+        assert (cell["trials"], cell["found"], cell["means"]["angle_deg"]) == (3, 1, 1.5)
+        assert cell["means"].keys() == cell["standard_errors"].keys() > cell["bounds"].keys()
+        assert cell["bounds"]["angle_deg"] > 0
 
 
 def test_what_is_there_is_not_run_again_and_stays_byte_by_byte(run_cylx, tmp_path, small, at_once):

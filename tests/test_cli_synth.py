@@ -2,6 +2,7 @@
 
 import inspect
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -119,3 +120,13 @@ def test_the_defaults_are_those_of_the_library(kind):
         assert options.pop("radius") == f"{library.pop('radius_min')}:{library.pop('radius_max')}"
         assert library.pop("room") is None
     assert {name: options[name] for name in library} == library
+
+
+@pytest.mark.parametrize(("kind", "cylinders"), [("single", 1), ("multi", 5)])
+def test_programs_are_told_what_was_written(run_cylx, tmp_path, kind, cylinders):
+    done = run_cylx("synth", kind, tmp_path / "a.ply", "--points", 3000, "--json")
+    answer = json.loads(done.stdout)
+    files = {"file": str(tmp_path / "a.ply"), "truth": str(tmp_path / "a.truth.json")}
+    assert answer == {**files, "points": 3000, "cylinders": cylinders}
+    assert len(json.loads(Path(answer["truth"]).read_text(encoding="utf-8"))["cylinders"]) == cylinders
+    assert run_cylx("synth", kind, tmp_path / "b.ply", "--points", 3000).stdout == ""

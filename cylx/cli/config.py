@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -10,7 +12,8 @@ import click
 from cylx.cli.failures import answer
 from cylx.cli.group import ExampleGroup
 from cylx.cli.options import PRESETS, complete_files, configured, debug_option, json_option, overwrite_option
-from cylx.errors import UsageError
+from cylx.cli.summary import legible
+from cylx.errors import ConfigError, UsageError
 
 if TYPE_CHECKING:
     from cylx.config import Config
@@ -55,12 +58,39 @@ def show(*, settings: Config, as_json: bool) -> None:
 
 @config.command(examples=["cylx config check my.yaml", "cylx config check my.yaml && cylx extract scan.ply -c my.yaml"])
 @click.argument("file", shell_complete=complete_files)
+@json_option
 @debug_option
-def check(*, file: str) -> None:
-    """Say whether the configuration FILE is valid, and what is wrong with it if not."""
+def check(*, file: str, as_json: bool) -> None:
+    """Say whether the configuration FILE is valid, and what is wrong with it if not.
+
+    The first fault is told on standard error; the JSON has all that can be seen at once.
+    """
     from cylx.config import load_config
 
-    answer(f"{file}: valid, preset {load_config(path=file).preset}\n")
+    try:
+        preset = load_config(path=file).preset
+    except ConfigError as failure:
+        if as_json:
+            answer(_verdict(file, None, _faults_of(failure, file)))
+        raise
+    answer(_verdict(file, preset, []) if as_json else f"{file}: valid, preset {preset}\n")
+
+
+def _verdict(file: str, preset: str | None, faults: Sequence[Mapping[str, object]]) -> str:
+    """Say for programs what was found."""
+    content = {"file": legible(file), "valid": not faults, "preset": preset, "faults": faults}
+    return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
+
+
+def _faults_of(failure: ConfigError, file: str) -> list[dict[str, object]]:
+    """Give all faults with the dotted path or the line, whichever is known."""
+    place = failure.place.removeprefix(file)
+    line, key = re.fullmatch(r":(\d+)", place), re.fullmatch(r"(?:: )?(\w+(?:\.\w+)*)", place)
+    known = failure.faults or ((key[1] if key else "", failure.fault, failure.remedy),)
+    return [
+        {"key": path or None, "line": int(line[1]) if line else None, "fault": fault, "remedy": remedy}
+        for path, fault, remedy in known
+    ]
 
 
 @config.command(examples=["cylx config schema > cylx.schema.json", "cylx config schema --result"])

@@ -94,7 +94,7 @@ def found_line(job: Job, found: int) -> str:
     """Write how many cylinders a scan has, and where they were written."""
     from cylx.io import printable
 
-    written = [printable(name) for name in job.outputs if name != "-"]
+    written = [printable(name) for name in job.written(found) if name != "-"]
     scan = "standard input" if job.scan == "-" else printable(job.scan)
     names = " and ".join(filter(None, [", ".join(written[:-1]), *written[-1:]]))
     return f"{scan}: {found} cylinder{'' if found == 1 else 's'}" + (f", written to {names}" if written else "")

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import json
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.failures import tell
+from cylx.cli.failures import answer, tell
 from cylx.cli.group import ExampleCommand
-from cylx.cli.options import complete_files, debug_option, overwrite_option
+from cylx.cli.meshes import drawing_of, remarks_on, units_option
+from cylx.cli.options import complete_files, debug_option, json_option, overwrite_option
 from cylx.cli.outputs import check_apart
 from cylx.cli.staging import write_together
+from cylx.cli.summary import legible
 from cylx.errors import InputError
 
 if TYPE_CHECKING:
@@ -18,8 +21,6 @@ if TYPE_CHECKING:
 
     from cylx.export import Drawing, Exported
     from cylx.results import ResultCylinder
-
-_UNITS = ("m", "mm", "cm", "in", "ft")
 
 
 @click.command(
@@ -31,16 +32,19 @@ _UNITS = ("m", "mm", "cm", "in", "ft")
 )
 @click.argument("result", shell_complete=complete_files)
 @click.argument("outputs", metavar="OUT...", nargs=-1, required=True, shell_complete=complete_files)
-@click.option(
-    "--units",
-    type=click.Choice(_UNITS),
-    help="Unit of the scan; .glb, .step, .ifc and .dxf need it.",
-)
+@units_option(".glb, .step, .ifc and .dxf need")
 @click.option("--min-confidence", type=click.FloatRange(0, 1), metavar="X", help="Leave out what is less sure.")
 @overwrite_option
+@json_option
 @debug_option
 def export(
-    *, result: str, outputs: tuple[str, ...], units: str | None, min_confidence: float | None, overwrite: bool
+    *,
+    result: str,
+    outputs: tuple[str, ...],
+    units: str | None,
+    min_confidence: float | None,
+    overwrite: bool,
+    as_json: bool,
 ) -> None:
     """Write the cylinders of RESULT for other programs.
 
@@ -59,21 +63,32 @@ def export(
     written = {name: render(drawing, known, name) for name, known in formats.items()}
     write_together({name: exported.data for name, exported in written.items()}, overwrite=overwrite)
     _report(result, drawing, written)
+    if as_json:
+        answer(json.dumps(_told(result, drawing, written), indent=2, ensure_ascii=False) + "\n")
+
+
+def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[str, Any]:
+    """Say what was written, for programs."""
+    return {
+        "result": legible(result),
+        "cylinders": len(drawing.cylinders),
+        "flat": drawing.flat,
+        "units": drawing.unit,
+        "files": [
+            {"file": legible(name), "bytes": len(exported.data), "offset": exported.offset}
+            for name, exported in written.items()
+        ],
+    }
 
 
 def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing:
     """Read a result and choose what is drawn."""
-    import numpy as np
-
-    from cylx.export import draw
     from cylx.io import read_json
-    from cylx.palette import cylinder_colors
     from cylx.results import Result
 
     content = Result.parse(read_json(path), path)
     chosen = content.cylinders if min_confidence is None else _sure(path, content.cylinders, min_confidence)
-    ids = np.array([cylinder.id for cylinder in chosen], dtype=np.int64)
-    return draw(chosen, cylinder_colors(ids), unit=units, place=path)
+    return drawing_of(chosen, units, path)
 
 
 def _sure(path: str, cylinders: Sequence[ResultCylinder], least: float) -> list[ResultCylinder]:
@@ -87,9 +102,5 @@ def _report(path: str, drawing: Drawing, written: dict[str, Exported]) -> None:
     """Say what was written where, and what its reader has to know."""
     count = len(drawing.cylinders)
     tell(f"{path}: {count} cylinder{'' if count == 1 else 's'}, written to {', '.join(written)}")
-    if drawing.flat and any(not name.lower().endswith(".csv") for name in written):
-        tell(f"warning: of height 0, and only in tables: cylinder {', '.join(map(str, drawing.flat))}")
-    for name, exported in written.items():
-        if exported.offset is not None:
-            x, y, z = exported.offset
-            tell(f"warning: {name}: add {x:.0f} {y:.0f} {z:.0f} to all coordinates; they are too large for its numbers")
+    for remark in remarks_on(drawing, written):
+        tell(f"warning: {remark}")

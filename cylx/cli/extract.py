@@ -10,6 +10,7 @@ import click
 
 from cylx.cli.batch_options import Many, made_folder, with_many
 from cylx.cli.group import ExampleCommand
+from cylx.cli.meshes import check_meshes, units_option
 from cylx.cli.options import complete_files, configured, debug_option, overwrite_option, talking
 from cylx.cli.outputs import Job, check_apart, check_format, check_outputs, plan_jobs, write_job
 from cylx.cli.selecting import selecting
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     "--output",
     metavar="FILE",
     shell_complete=complete_files,
-    help="The JSON; - for standard output, or a folder.  [default: beside the scan]",
+    help="The JSON; - for standard output, as --json elsewhere, or a folder.  [default: beside the scan]",
 )
 @click.option(
     "--annotate/--no-annotate",
@@ -63,6 +64,13 @@ if TYPE_CHECKING:
     shell_complete=complete_files,
     help="Write a picture of the cloud and its cylinders; - for standard output, or a folder. Needs matplotlib.",
 )
+@click.option(
+    "--mesh",
+    metavar="FILE",
+    shell_complete=complete_files,
+    help="Write the cylinders as a mesh: .ply, .obj, .glb or .stl, or a folder for an .obj. Needs trimesh.",
+)
+@units_option("a mesh that is .glb needs")
 @configured
 @selecting
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
@@ -88,6 +96,8 @@ def extract(
     rejected: str | None,
     report: str | None,
     png: str | None,
+    mesh: str | None,
+    units: str | None,
     settings: Config,
     selection: Selection,
     threads: int | None,
@@ -109,7 +119,8 @@ def extract(
 
     output = many.output(output)
     found = find_scans(scans, recursive=many.recursive)
-    jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png)
+    jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png, mesh, units)
+    check_meshes([job.mesh for job in jobs if job.mesh is not None], units)
     summaries, extras = many.summaries(output, found), [] if profile is None else [profile]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])
     run = Run(settings, threads, require, overwrite or many.resume, talk, selection)
@@ -180,10 +191,12 @@ class Run:
             check_format(job, cloud)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
             with observed(observer, "writing"):
-                write_job(job, extraction, overwrite=self.overwrite)
+                remarks = write_job(job, extraction, overwrite=self.overwrite)
         found = len(extraction.cylinders)
         profile = stopwatch.report(cloud.rows, found)
         self.talk.report(job, extraction)
+        for remark in remarks:
+            self.talk.say(f"warning: {remark}")
         return Finished(cloud.rows, found, extraction.warnings, profile)
 
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from cylx.cli.failures import answer, tell
 from cylx.cli.group import ExampleCommand
+from cylx.cli.memory import memory_available, memory_for
 from cylx.cli.options import complete_files, debug_option, json_option
 from cylx.cli.selecting import selecting
 from cylx.errors import InputError
 
 if TYPE_CHECKING:
+    from cylx.cautions import Caution
     from cylx.records import PointCloud, Selection
 
 
@@ -26,25 +29,79 @@ if TYPE_CHECKING:
 @json_option
 @debug_option
 def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
-    """Show what is in a scan: fields, points, bounds, spacing, noise.
+    """Show what is in a scan, which cylinders can be found in it, and what will go wrong.
 
     SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, or - for standard input. Spacing and noise are measured as
-    'cylx extract' does, in the unit of the scan. If only some points take part, bounds and scale are theirs.
+    'cylx extract' does, in the unit of the scan; the radii that it looks for and the memory that it takes follow. If
+    only some points take part, all that is theirs. What will go wrong is said in a line each on standard error.
     """
     from cylx.io import read_cloud
-    from cylx.scene import check_usable, measure_scene
     from cylx.selection import select
 
     whole = read_cloud(scan, scan=selection.scan)
     cloud = select(whole, selection)
     facts = describe_cloud(whole, cloud)
     try:
-        check_usable(cloud.points, cloud.source.file)
-        scene = measure_scene(cloud.points, seed)
-        facts["scene"] = {"spacing": scene.spacing, "noise": scene.noise}
+        prospects, found = look_ahead(whole, cloud, seed)
+        facts.update(prospects)
     except InputError as failure:
-        tell(f"warning: {failure.place}: {failure.fault}; cylinders cannot be looked for in it")
+        from cylx.cautions import Caution
+
+        found = [Caution("unusable", failure.fault, "cylinders cannot be looked for in it")]
+    found += _scarce_memory(facts["extract_memory_bytes"])
+    facts["warnings"] = [asdict(caution) for caution in found]
+    for caution in found:
+        tell(f"warning: {cloud.source.file}: {caution}")
     answer(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if as_json else as_text(facts))
+
+
+def look_ahead(whole: PointCloud, cloud: PointCloud, seed: int) -> tuple[dict[str, Any], list[Caution]]:
+    """Measure the scale of a cloud, and say what it means for its cylinders.
+
+    Parameters
+    ----------
+    whole : PointCloud
+        As it was read.
+    cloud : PointCloud
+        The points of it that take part.
+    seed : int
+        Of the measurement.
+
+    Returns
+    -------
+    facts : dict
+        `scene` and `radius`.
+    found : list of Caution
+
+    Raises
+    ------
+    InputError
+        If no cylinder could be told from anything else in it.
+    """
+    from cylx.cautions import cautions
+    from cylx.config import load_config
+    from cylx.scene import check_usable, measure_scene, resolve, thinnest
+
+    check_usable(cloud.points, cloud.source.file)
+    scene = measure_scene(cloud.points, seed)
+    settings = resolve(load_config(), scene)
+    limits, least = settings.scene, settings.verification.min_inliers
+    facts = {
+        "scene": {"spacing": scene.spacing, "noise": scene.noise},
+        "radius": {"min": limits.radius_min, "found_from": thinnest(scene)[1], "max": limits.radius_max},
+    }
+    return facts, cautions(whole, cloud, scene, least)
+
+
+def _scarce_memory(needed: int) -> list[Caution]:
+    """Notice that the extraction may not fit into the memory that is free now."""
+    from cylx.cautions import Caution
+
+    available = memory_available()
+    if available is None or needed <= available:
+        return []
+    fault = f"'cylx extract' takes about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free"
+    return [Caution("memory", fault, "take a part of the scan by --crop or --voxel")]
 
 
 def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
@@ -62,6 +119,7 @@ def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
     }
     if cloud is not whole:
         facts["selected"] = len(cloud.points)
+    facts["extract_memory_bytes"] = memory_for(cloud.rows if cloud is whole else len(cloud.points))
     if len(cloud.points):
         low, high = cloud.points.min(axis=0), cloud.points.max(axis=0)
         facts["bounds"] = {"min": low.tolist(), "max": high.tolist()}
@@ -87,6 +145,9 @@ def as_text(facts: dict[str, Any]) -> str:
     if "scene" in facts:
         lines["spacing"] = f"{facts['scene']['spacing']:.4g}"
         lines["noise"] = f"{facts['scene']['noise']:.4g}"
+        radius = facts["radius"]
+        lines["radii"] = f"{radius['min']:.4g} to {radius['max']:.4g}, found as a rule from {radius['found_from']:.4g}"
+    lines["memory"] = f"{facts['extract_memory_bytes'] / 1e9:.2g} GB for cylx extract"
     return "".join(f"{name:<8} {value}\n" for name, value in lines.items())
 
 

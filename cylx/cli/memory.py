@@ -17,7 +17,12 @@ def memory_needed(scan: str) -> int:
     """Estimate the peak memory of the extraction of a scan, bytes."""
     from cylx.io import expected_points
 
-    return BASE + A_POINT * expected_points(scan)
+    return memory_for(expected_points(scan))
+
+
+def memory_for(points: int) -> int:
+    """Estimate the peak memory of the extraction of so many points, bytes."""
+    return BASE + A_POINT * points
 
 
 def memory_available() -> float | None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from cylx.records import Extraction, PointCloud
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
-REPORT, PICTURE = ".report.html", ".cylinders.png"
+REPORT, PICTURE, MESH = ".report.html", ".cylinders.png", ".cylinders.obj"
 
 
 @dataclass(frozen=True)
@@ -37,6 +37,10 @@ class Job:
         The page to look at, `-` for standard output, None for none.
     picture : str or None
         The PNG, `-` for standard output, None for none.
+    mesh : str or None
+        The mesh of the cylinders, None for none.
+    units : str or None
+        Unit of the scan, for meshes that have one; None if it was not said.
     """
 
     scan: str
@@ -45,12 +49,18 @@ class Job:
     rejected: str | None = None
     report: str | None = None
     picture: str | None = None
+    mesh: str | None = None
+    units: str | None = None
 
     @property
     def outputs(self) -> list[str]:
-        """What it writes."""
-        names = (self.result, self.annotated, self.rejected, self.report, self.picture)
+        """What it may write."""
+        names = (self.result, self.annotated, self.rejected, self.report, self.picture, self.mesh)
         return [name for name in names if name is not None]
+
+    def written(self, found: int) -> list[str]:
+        """Leave out what is not written if so many cylinders are found: of none there is no mesh."""
+        return [name for name in self.outputs if found or name != self.mesh]
 
 
 def plan_jobs(
@@ -61,30 +71,24 @@ def plan_jobs(
     rejected: str | None = None,
     report: str | None = None,
     picture: str | None = None,
+    mesh: str | None = None,
+    units: str | None = None,
 ) -> list[Job]:
     """Name the outputs of every scan.
 
     They lie beside the scan, or where `-o` says: a file for one scan, a folder for one or several. The annotated cloud
-    lies beside the JSON; what was not accepted, the report and the picture are written only where `--rejected`,
-    `--report` and `--png` say. What comes from standard input goes to standard output, unless `-o` says otherwise, and
-    what goes to standard output goes there alone, unless an annotated cloud is asked for.
+    lies beside the JSON; what was not accepted, the report, the picture and the mesh are written only where an option
+    says. What comes from standard input goes to standard output, unless `-o` says otherwise, and what goes to standard
+    output goes there alone, unless an annotated cloud is asked for.
 
     Parameters
     ----------
     scans : sequence of str
         The inputs.
-    output : str or None
-        `-o`.
+    output, annotated, rejected, report, picture, mesh, units : str or None
+        `-o`, `--annotated`, `--rejected`, `--report`, `--png`, `--mesh` and `--units`.
     annotate : bool or None
         `--annotate` or `--no-annotate`, None for neither.
-    annotated : str or None
-        `--annotated`.
-    rejected : str or None
-        `--rejected`.
-    report : str or None
-        `--report`.
-    picture : str or None
-        `--png`.
 
     Raises
     ------
@@ -94,7 +98,8 @@ def plan_jobs(
     names = (output, annotated, rejected, report, picture)
     output, annotated, rejected, report, picture = (STREAM if name == "/dev/stdout" else name for name in names)
     if len(scans) > 1:
-        _check_batch(scans, output, annotated, {"--rejected": rejected, "--report": report, "--png": picture})
+        folders = {"--rejected": rejected, "--report": report, "--png": picture, "--mesh": mesh}
+        _check_batch(scans, output, annotated, folders)
     jobs = [_plan(scan, output, annotate, annotated) for scan in scans]
     if rejected is not None:
         jobs = [replace(job, rejected=_inside(rejected, job.scan, REJECTED)) for job in jobs]
@@ -102,6 +107,8 @@ def plan_jobs(
         jobs = [replace(job, report=_inside(report, job.scan, REPORT)) for job in jobs]
     if picture is not None:
         jobs = [replace(job, picture=_inside(picture, job.scan, PICTURE)) for job in jobs]
+    if mesh is not None:
+        jobs = [replace(job, mesh=_inside(mesh, job.scan, MESH), units=units) for job in jobs]
     _check_twins(jobs)
     check_apart(scans, [name for job in jobs for name in job.outputs])
     return jobs
@@ -162,20 +169,27 @@ def check_format(job: Job, cloud: PointCloud) -> None:
         check_annotated(job.annotated, cloud)
 
 
-def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
+def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]:
     """Write the JSON, and what else was asked for of one scan, all or nothing.
+
+    Returns
+    -------
+    list of str
+        What the reader of a mesh has to know.
 
     Raises
     ------
     OutputError
         If one of them cannot be written.
     """
+    from cylx.cli.meshes import mesh_of
     from cylx.io import write_annotated, write_bytes, write_text
     from cylx.rejections import Rejections
     from cylx.results import Result
 
-    text = Result.of(extraction).to_json()
+    content = Result.of(extraction)
     page, picture = _looks(job, extraction)
+    mesh, remarks = (None, []) if job.mesh is None else mesh_of(job.mesh, content.cylinders, job.units)
     with contextlib.ExitStack() as stack:
 
         def staged(name: str) -> str | Path:
@@ -191,7 +205,12 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> None:
             write_text(staged(job.report), page, overwrite=overwrite)
         if job.picture is not None:
             write_bytes(staged(job.picture), picture, overwrite=overwrite)
-        write_text(result, text, overwrite=overwrite)
+        if job.mesh is not None and mesh is not None:
+            write_bytes(staged(job.mesh), mesh, overwrite=overwrite)
+        write_text(result, content.to_json(), overwrite=overwrite)
+    if job.mesh is not None and mesh is None:  # that of an earlier result does not belong to this one
+        Path(job.mesh).unlink(missing_ok=True)
+    return remarks
 
 
 def _looks(job: Job, extraction: Extraction) -> tuple[str, bytes]:

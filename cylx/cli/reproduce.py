@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import os
+from math import isfinite
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING
@@ -12,7 +14,7 @@ import click
 from cylx import __version__
 from cylx.cli.failures import answer
 from cylx.cli.group import ExampleCommand
-from cylx.cli.options import complete_files, debug_option, talking
+from cylx.cli.options import complete_files, debug_option, json_option, talking
 from cylx.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
@@ -53,6 +55,7 @@ SAVED_EVERY = 5.0
     help="Scan of an upright can for figures 11 and 12, such as the tomato soup can of the YCB objects.",
 )
 @talking
+@json_option
 @debug_option
 def reproduce(
     *,
@@ -63,12 +66,13 @@ def reproduce(
     out: str,
     data: str | None,
     talk: Conversation,
+    as_json: bool,
 ) -> None:
     """Run the paper's experiments again.
 
     FIGURE is a number from 5 to 12, or all. For each this writes figure-N.csv, a line a trial, and figure-N.png, and
-    a table of means goes to standard output. What is interrupted goes on where it was. Times are those of this machine,
-    of one thread in each of --jobs processes.
+    a table of means goes to standard output, with --json all figures at the end. What is interrupted goes on where it
+    was. Times are those of this machine, of one thread in each of --jobs processes.
     """
     from cylx.experiments import FIGURES
     from cylx.io import read_object
@@ -85,8 +89,15 @@ def reproduce(
 
         scan = ObjectScan.of(*read_object(data))
     study = Study(Path(out), trials, jobs or os.cpu_count() or 1, talk)
+    told = []
     for figure in chosen:
-        study.run(figure, scan if figure.needs_scan else None)
+        summaries = study.run(figure, scan if figure.needs_scan else None)
+        if as_json:
+            told.append({"figure": figure.number, "title": figure.title, "cells": [_told(one) for one in summaries]})
+        else:
+            _show(figure, summaries)
+    if as_json:
+        answer(json.dumps({"figures": told}, indent=2, ensure_ascii=False) + "\n")
 
 
 class Study:
@@ -118,8 +129,8 @@ class Study:
             fault = f"cannot be made: {(error.strerror or str(error)).lower()}"
             raise OutputError(str(folder), fault, "give another folder by --out") from None
 
-    def run(self, figure: Figure, scan: ObjectScan | None) -> None:
-        """Run what is missing of a figure, draw it, and show its means.
+    def run(self, figure: Figure, scan: ObjectScan | None) -> list[Summary]:
+        """Run what is missing of a figure, draw it, and give its means.
 
         Raises
         ------
@@ -152,8 +163,8 @@ class Study:
         wanted = {key: outcome for key, outcome in done.items() if key.trial < self.trials}
         summaries = summarize(figure, wanted)
         write_bytes(picture, draw(figure, summaries, wanted), overwrite=True)
-        _show(figure, summaries)
         self.talk.say(f"figure {figure.number}: {len(tasks)} trials run, written to {table} and {picture}")
+        return summaries
 
     def _read(self, table: Path, made_by: str) -> Trials:
         """Read the trials that are done."""
@@ -195,6 +206,27 @@ def _only(figures: list[Figure], curves: str | None) -> list[Figure]:
         numbers = " and ".join(str(figure.number) for figure in figures)
         raise UsageError(f"--curves {curves}", f"figure {numbers} has none of them", "leave --curves out")
     return left
+
+
+def _told(summary: Summary) -> dict[str, object]:
+    """Write down the means of a cell; what is not known is null."""
+    names, cell = ("angle_deg", "offset_radii", "radius_percent", "seconds"), summary.cell
+    known = {name: (mean, error) for name, mean, error in zip(names, summary.means, summary.errors, strict=True)}
+    bound = dict(zip(names, summary.bound or (), strict=False))
+    return {
+        "panel": cell.panel,
+        "curve": cell.curve,
+        "x": cell.x,
+        "trials": summary.trials,
+        "found": _number(summary.found),
+        "means": {name: _number(mean) for name, (mean, _) in known.items()},
+        "standard_errors": {name: _number(error) for name, (_, error) in known.items()},
+        "bounds": {name: _number(least) for name, least in bound.items()},
+    }
+
+
+def _number(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
 
 
 def _show(figure: Figure, summaries: list[Summary]) -> None:

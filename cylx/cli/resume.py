@@ -40,13 +40,14 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
     from cylx.io import read_json, recorded_name, sha256_of
     from cylx.results import Result
 
-    if STREAM in (job.scan, *job.outputs) or not all(Path(name).is_file() for name in job.outputs):
+    if STREAM in (job.scan, *job.outputs) or not all(Path(name).is_file() for name in job.written(0)):
         return None
     try:
         result = Result.parse(read_json(job.result), job.result)
         if result.cylx_version != __version__ or result.input.file != recorded_name(job.scan):
             return None
         same = is_of_settings(result, settings) and result.input.is_of(selection)
+        same = same and all(Path(name).is_file() for name in job.written(len(result.cylinders)))
         same = same and result.input.sha256 == sha256_of(job.scan)
     except InputError:
         return None

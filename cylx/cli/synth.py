@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import click
 
+from cylx.cli.failures import answer
 from cylx.cli.group import ExampleGroup
-from cylx.cli.options import Bounds, RadiusRange, Vector, complete_files, debug_option, overwrite_option
+from cylx.cli.options import Bounds, RadiusRange, Vector, complete_files, debug_option, json_option, overwrite_option
 from cylx.cli.outputs import TRUTH, check_apart
+from cylx.cli.summary import legible
 from cylx.errors import UsageError
 
 if TYPE_CHECKING:
@@ -22,7 +24,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 def output_options(command: Command) -> Command:
     """Add what both scenes have in common: where it lies, and how it is written."""
-    command = debug_option(overwrite_option(command))
+    command = debug_option(json_option(overwrite_option(command)))
     for option in _OUTPUT:
         command = option(command)
     return command
@@ -68,6 +70,7 @@ def single(
     offset: tuple[float, ...],
     precision: str,
     overwrite: bool,
+    as_json: bool,
     **parameters: Any,  # noqa: ANN401  the options of the scene, of many types
 ) -> None:
     """Make one cylinder of radius 1, as in the paper.
@@ -78,7 +81,7 @@ def single(
 
     prepare(out, overwrite=overwrite)
     scene = synthetic.single(**parameters).moved(scale, offset)
-    write_scene(out, scene, precision=precision, overwrite=overwrite)
+    write_scene(out, scene, precision=precision, overwrite=overwrite, as_json=as_json)
 
 
 @synth.command(examples=["cylx synth multi room.ply --cylinders 10", "cylx synth multi room.ply --scale 1000"])
@@ -104,6 +107,7 @@ def multi(
     offset: tuple[float, ...],
     precision: str,
     overwrite: bool,
+    as_json: bool,
     radius: Bounds,
     **parameters: Any,  # noqa: ANN401  the options of the scene, of many types
 ) -> None:
@@ -118,7 +122,7 @@ def multi(
     if radius_min is None or radius_max is None:
         raise UsageError("--radius", "one side is empty", "give both, such as 0.04:0.16")
     scene = synthetic.multi(radius_min=radius_min, radius_max=radius_max, **parameters).moved(scale, offset)
-    write_scene(out, scene, precision=precision, overwrite=overwrite)
+    write_scene(out, scene, precision=precision, overwrite=overwrite, as_json=as_json)
 
 
 def truth_path(out: str) -> str:
@@ -135,10 +139,14 @@ def prepare(out: str, *, overwrite: bool) -> None:
         check_writable(path, overwrite=overwrite)
 
 
-def write_scene(out: str, scene: SyntheticScene, *, precision: str, overwrite: bool) -> None:
-    """Write a scene and its truth."""
+def write_scene(out: str, scene: SyntheticScene, *, precision: str, overwrite: bool, as_json: bool) -> None:
+    """Write a scene and its truth, and for programs say what was written."""
     from cylx.io import write_cloud, write_text
 
     dtype: Literal["f4", "f8"] = "f4" if precision == "single" else "f8"
     write_cloud(out, scene.points, properties=None, overwrite=overwrite, dtype=dtype)
     write_text(truth_path(out), json.dumps(scene.truth(), indent=2) + "\n", overwrite=overwrite)
+    if as_json:
+        files = {"file": legible(out), "truth": legible(truth_path(out))}
+        told = {**files, "points": len(scene.points), "cylinders": len(scene.cylinders)}
+        answer(json.dumps(told, indent=2, ensure_ascii=False) + "\n")

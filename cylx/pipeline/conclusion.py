@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.cautions import damage
 from cylx.config import Config
 from cylx.geometry.mixture_fit import CONTRADICTION
 from cylx.measures import covered_angle
@@ -81,7 +82,7 @@ def conclude(
     in_cloud = np.empty(len(labels), np.int32), np.empty(len(labels), np.float32)
     in_cloud[0][frame.order] = number[labels]
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
-    warnings = (*_warnings(scene, fits), *_contradicted(config, fits), *_unlisted(config, fits))
+    warnings = (*_warnings(cloud, scene, fits), *_contradicted(config, fits), *_unlisted(config, fits))
     lost = [Refusal.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
     rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified, game=game))
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
@@ -153,14 +154,9 @@ def _unlisted(config: Config, fits: list[CylinderFit]) -> list[str]:
     return ["no radius was snapped to the catalogue: all are as they are without it; is it in the unit of the scan?"]
 
 
-def _warnings(scene: Scene, fits: list[CylinderFit]) -> list[str]:
+def _warnings(cloud: PointCloud, scene: Scene, fits: list[CylinderFit]) -> list[str]:
     """Say what a user should know before trusting the answer."""
-    out = []
-    if scene.noise > scene.spacing:
-        out.append(
-            f"the noise ({scene.noise:.3g}) exceeds the spacing of the points ({scene.spacing:.3g}): "
-            f"cylinders with a radius below about {10 * scene.noise:.3g} cannot be told from noise"
-        )
+    out = [str(caution) for caution in damage(cloud, scene)]
     thin = sum(1 for fit in fits if fit.coverage < np.radians(60.0))
     if thin:
         out.append(f"{thin} cylinder{'s' if thin > 1 else ''} covered by less than 60 degrees: the radius is uncertain")
