@@ -112,6 +112,48 @@ class Elbow:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Horn:
+    """A bent solid that thins towards its ends, its section flattened: a banana, a gourd, a handle.
+
+    Its middle line is an arc of `bend` and `angle` about the third column of `turn`; `thin` is the share of the tube's
+    radius that is missing at the ends, `flat` the amplitude of the section's ovality as a share of its radius.
+    """
+
+    center: np.ndarray
+    turn: np.ndarray
+    tube: float
+    bend: float
+    angle: float
+    thin: float
+    flat: float
+    open: bool = False
+
+    @property
+    def area(self):
+        return 2 * np.pi * self.tube * (1 - self.thin / 3) * self.bend * self.angle
+
+    def sample(self, rng, n):
+        along, about = rng.uniform(-1, 1, 4 * n + 8), rng.uniform(0, 2 * np.pi, 4 * n + 8)
+        tube = self._tube(along)
+        likely = tube * (1 + tube / self.bend * np.cos(about))
+        kept = np.flatnonzero(rng.random(len(along)) * self.tube * (1 + self.tube / self.bend) < likely)
+        kept = np.resize(kept, n)  # enough of them, but for the unluckiest of draws
+        along, about, tube = 0.5 * self.angle * along[kept], about[kept], tube[kept]
+        tube = tube * (1 + self.flat * np.cos(2 * about))
+        out = self.bend + tube * np.cos(about)
+        local = np.column_stack([out * np.cos(along), out * np.sin(along), tube * np.sin(about)])
+        return self.center + local @ self.turn.T
+
+    def _tube(self, along):
+        return self.tube * (1 - self.thin * along**2)
+
+    def normals(self, points):
+        local = (points - self.center) @ self.turn
+        local[:, :2] *= 1 - self.bend / np.maximum(np.linalg.norm(local[:, :2], axis=1, keepdims=True), 1e-12)
+        return _unit(local @ self.turn.T)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Ellipsoid:
     """An ellipsoid with its semi-axes along the columns of `turn`."""
 

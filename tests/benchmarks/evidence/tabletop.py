@@ -2,7 +2,7 @@
 
 import numpy as np
 from drafts import Sketch, finish
-from solids import Elbow, Ellipsoid, Lathe, RoundedBox, lid, random_dents, random_turn
+from solids import Elbow, Ellipsoid, Horn, Lathe, RoundedBox, lid, random_dents, random_turn
 from visibility import scanned
 
 from cylx.geometry.cylinder import Cylinder, axis_frame
@@ -19,7 +19,7 @@ def tabletop(rng, kind, seed, points=None):
     sketch, taken = Sketch.empty(), []
     sketch.add(Wall(TABLE, 2, 0.0))
     for _ in range(rng.integers(3, 13)):
-        thing = rng.choice([can, bottle, cup, carton, bowl, ball])
+        thing = rng.choice([can, bottle, cup, carton, bowl, ball, fruit])
         thing(rng, sketch, taken)
     total = points or int(10 ** rng.uniform(4.7, 5.5))
     draft = (
@@ -85,6 +85,10 @@ def can(rng, sketch, taken):
         depth = rng.uniform(0.0, 0.12) * radius if real else 0.0  # lids of tins lie below their rims
         inner = Cylinder(shape.point, shape.direction, radius, height - 2 * depth)
         sketch.add(lid(inner, -1), lid(inner, 1))
+        if real and rng.random() < 0.5:  # rolled rims
+            bead = rng.uniform(0.0007, 0.0025)
+            turn = np.column_stack([*axis_frame(direction), direction])
+            sketch.add(*(Elbow(end, turn, bead, radius, 2 * np.pi) for end in (shape.start, shape.end)))
 
 
 def formed(rng, foot, direction, radius, height):
@@ -186,3 +190,17 @@ def ball(rng, sketch, taken):
         sketch.add(Sphere(place + radius * UP, radius))
     else:
         sketch.add(Ellipsoid(place + radius * UP, radius * rng.uniform(0.6, 1.4, 3), random_turn(rng)))
+
+
+def fruit(rng, sketch, taken):
+    """Add something bent that thins towards its ends: a banana, a gourd, a loose handle, lying."""
+    tube = rng.uniform(0.006, 0.03)
+    bend, angle = tube * rng.uniform(3, 12), rng.uniform(0.6, 2.2)
+    place = spot(rng, taken, bend * np.sin(0.5 * angle) + tube)
+    if place is None:
+        return
+    first = rng.uniform(0, 2 * np.pi)
+    out = np.array([np.cos(first), np.sin(first), 0])
+    turn = np.column_stack([out, np.cross(UP, out), UP])
+    thin, flat = rng.uniform(0.1, 0.8), rng.uniform(0, 0.15)
+    sketch.add(Horn(place + tube * UP - bend * out, turn, tube, bend, angle, thin, flat))
