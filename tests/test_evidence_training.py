@@ -206,6 +206,7 @@ SURFACES = {
     "bulging": solids.worn(PIPE, 0.0, 2 * np.pi, 0.0, 0.1),
     "lid": solids.lid(PIPE, 1),
     "elbow": solids.Elbow(np.ones(3), TURN, 0.2, 0.6, 2.0),
+    "horn": solids.Horn(np.ones(3), TURN, 0.2, 1.5, 1.5, 0.3, 0.0),
     "ellipsoid": solids.Ellipsoid(np.ones(3), np.array([0.5, 0.7, 1.1]), TURN),
     "rounded box": solids.RoundedBox(Box(np.ones(3), np.array([1.0, 2, 3]), TURN), 0.2),
 }
@@ -226,7 +227,7 @@ def test_a_step_along_the_normal_leaves_the_surface_at_a_right_angle(surface):
     assert (slopes.min(axis=1) < 0.2).mean() > 0.95  # but for edges
 
 
-@pytest.mark.parametrize("name", ["cone", "bulging", "lid", "elbow", "ellipsoid"])
+@pytest.mark.parametrize("name", ["cone", "bulging", "lid", "elbow", "horn", "ellipsoid"])
 def test_points_are_even_over_the_area(name):
     """As many points per area near the one end of a surface as anywhere: the area is what the points say it is."""
     surface = SURFACES[name]
@@ -237,6 +238,19 @@ def test_points_are_even_over_the_area(name):
     counts = drafts.cKDTree(points).query_ball_point(points[at], reach, return_length=True) - 1
     expected = len(points) * np.pi * reach**2 / surface.area
     assert np.median(counts) == pytest.approx(expected, rel=0.06)
+
+
+def test_a_dent_is_as_deep_as_it_says_where_it_is():
+    dent = solids.Dent(height=0.5, angle=1.0, depth=0.2, length=0.1, width=0.3)
+    surface = solids.worn(PIPE, 0.0, 2 * np.pi, 0.0, 0.0, (dent,))
+    heights, distances, angles = cylinder_coordinates(
+        surface.sample(np.random.default_rng(5), 50000), PIPE.start, PIPE.direction
+    )
+    depths = 1 - distances / PIPE.radius
+    at = (np.abs(heights - 0.5) < 0.02) & (np.abs(angles - 1.0) < 0.05)
+    assert depths[at] == pytest.approx(0.2, abs=0.01)
+    assert depths.max() <= 0.2 + 1e-9
+    assert depths[np.abs(heights - 0.5) > 0.5] == pytest.approx(0.0, abs=1e-4)
 
 
 def test_what_is_behind_is_not_seen():
@@ -289,7 +303,7 @@ def test_the_truth_of_a_scene_is_where_its_points_are(kind):
             asked += 1
             heights, distances, _ = cylinder_coordinates(mine, shape.point, shape.direction)
             within = np.abs(distances - shape.radius) < 0.03 * shape.radius + 8 * scene.sigma
-            assert within.mean() > 0.97
+            assert within.mean() > (0.7 if kind in {"plant", "tabletop"} else 0.97)  # dents may be all there is to see
             assert np.quantile(np.abs(heights), 0.95) < 0.5 * shape.height + 4 * scene.sigma
             assert true.points >= 40
             assert true.coverage_deg >= 25
@@ -389,6 +403,7 @@ def synthetic_line(rng, index):
     true = bool(rng.random() < 0.4)
     measures |= {"height_radii": float(5 * rng.random()), "agreement": float(0.4 * true + 0.5 * rng.random())}
     measures |= {"curvature": 9.0, "windows": 5.0, "places": 12.0, "coverage": 3.0, "inliers": 300.0, "payoff": 0.7}
+    measures["lack_of_fit"] = float(1.0 + rng.random())
     return {
         "scene": f"s{index % 20}",
         "label": labels.TRUE if true else labels.FALSE,
