@@ -4,6 +4,7 @@ import inspect
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,10 @@ from hypothesis import settings
 settings.register_profile("ci", derandomize=True, deadline=None)
 settings.register_profile("anew", deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "anew")
+
+# two processes that compile one kernel at the same moment may mix up what they keep of it: each worker keeps its own
+if worker := os.environ.get("PYTEST_XDIST_WORKER"):
+    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).resolve().parents[1] / ".pytest_cache" / "kernels" / worker)
 
 CIRCLE = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 POINTS = np.round(np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE), np.arange(24) % 5]), 6)
