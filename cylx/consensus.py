@@ -102,12 +102,9 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
     square = dx * dx + dy * dy + dz * dz - height * height
     if abs(height) >= reach or square >= model[6] * model[6]:
         return 0
-    ratio = row[6] / model[6]
-    if not ALIKE < ratio < 1.0 / ALIKE:
-        return 0
-    turn = row[3] * model[3] + row[4] * model[4] + row[5] * model[5]
+    turn, ratio = row[3] * model[3] + row[4] * model[4] + row[5] * model[5], row[6] / model[6]
     if square >= (offset * model[6]) ** 2 or abs(turn) <= cosine:
-        return 1
+        return 1 if ALIKE < ratio < 1.0 / ALIKE else 0
     if abs(ratio - 1.0) < radius:
         return 2
     return 1 if CONCENTRIC < ratio < 1.0 / CONCENTRIC else 0  # a pipe within a pipe speaks for itself

@@ -133,5 +133,5 @@ def test_it_checks_what_the_package_needs_and_offers():
     assert {name for name in needs if "open3d" not in name and "libusb" not in name} == {
         name.lower() for name in diagnosis.NEEDED
     }
-    offered = set(metadata("cylx").get_all("Provides-Extra")) - {"test", "lint", "bench"}
+    offered = set(metadata("cylx").get_all("Provides-Extra")) - {"test", "lint", "bench", "docs"}
     assert offered <= {extra for extra, _ in diagnosis.OPTIONAL.values()}

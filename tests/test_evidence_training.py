@@ -303,7 +303,7 @@ def test_the_truth_of_a_scene_is_where_its_points_are(kind):
             asked += 1
             heights, distances, _ = cylinder_coordinates(mine, shape.point, shape.direction)
             within = np.abs(distances - shape.radius) < 0.03 * shape.radius + 8 * scene.sigma
-            assert within.mean() > (0.7 if kind in {"plant", "tabletop"} else 0.97)  # dents may be all there is to see
+            assert within.mean() > (0.5 if kind in {"plant", "tabletop"} else 0.97)  # dents may be much of what is seen
             assert np.quantile(np.abs(heights), 0.95) < 0.5 * shape.height + 4 * scene.sigma
             assert true.points >= 40
             assert true.coverage_deg >= 25

@@ -121,7 +121,7 @@ SMALL_PATCH = 2.0
 ENOUGH_PATCHES = 5
 MOST_NOISE = 4.0
 """No surface is taken for this many times noisier than usual: it would be none."""
-TOO_FLAT = 1.5
+TOO_FLAT = 2.0
 """A window this many radii across that is flat shows no cylinder."""
 
 

@@ -30,6 +30,9 @@ IndexArray = NDArray[np.int64]
 GROWTH_STEPS = 8
 DOUBT = 0.4
 """A piece of the height that was found to belong before is asked for this share of what one beyond the ends is."""
+DOUBTFUL = 0.75
+"""While a cylinder grows, points in flat windows of this share of what is too flat are left out, too, so that it does
+not follow what it touches, such as the floor under a can."""
 ROUGH = 0.02
 """While a cylinder grows, a fit may end at steps of this share of the spread."""
 ENOUGH = 6000
@@ -107,7 +110,7 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         beyond = max(1.5 * model[6], 0.7 * half) if step else 0.5 * model[6]
         shell = max(0.12 * model[6] if step == 0 else 0.05 * model[6], 5.0 * noise)
         width = shell + 8.0 * noise
-        points = _own_points(ground, model, half + beyond, width, MANY)
+        points = _own_points(ground, model, half + beyond, width, MANY, DOUBTFUL)
         if len(points) < 20:
             return "too few points"
         stride = max(1, len(points) // ENOUGH)
@@ -301,6 +304,8 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
     return Segment(moved, 0.5 * (high - low), spread)
 
 
-def _own_points(ground: Ground, model: FloatArray, half: float, width: float, most: int | None) -> FloatArray:
+def _own_points(
+    ground: Ground, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
+) -> FloatArray:
     """Give the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
-    return ground.cells.surface_points(model, half, width, most, ground.flatness, ground.too_flat(model[6]))
+    return ground.cells.surface_points(model, half, width, most, ground.flatness, strict * ground.too_flat(model[6]))
