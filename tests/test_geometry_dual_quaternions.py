@@ -262,7 +262,7 @@ def test_the_mean_is_where_the_weighted_logarithms_vanish(seed):
     _, _, motions, weights, _ = spread_motions(seed, 0.3)
     mean = blend(motions, weights)
     assert_unit(mean)
-    assert np.linalg.norm(weights @ logarithm(multiply(conjugate(mean), motions))) < 1e-10
+    assert np.linalg.norm(weights @ logarithm(multiply(conjugate(mean), motions))) < 1e-9
 
 
 @laws
