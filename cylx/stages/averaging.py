@@ -30,9 +30,10 @@ IndexArray = NDArray[np.int64]
 GROWTH_STEPS = 8
 DOUBT = 0.4
 """A piece of the height that was found to belong before is asked for this share of what one beyond the ends is."""
-DOUBTFUL = 0.75
+DOUBTFUL, WIDE = 0.75, 5.0
 """While a cylinder grows, points in flat windows of this share of what is too flat are left out, too, so that it does
-not follow what it touches, such as the floor under a can."""
+not follow what it touches, such as the floor under a can; but if its radius is fewer spacings than these, the strip
+that is seen of it may be flat itself."""
 ROUGH = 0.02
 """While a cylinder grows, a fit may end at steps of this share of the spread."""
 ENOUGH = 6000
@@ -110,7 +111,8 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         beyond = max(1.5 * model[6], 0.7 * half) if step else 0.5 * model[6]
         shell = max(0.12 * model[6] if step == 0 else 0.05 * model[6], 5.0 * noise)
         width = shell + 8.0 * noise
-        points = _own_points(ground, model, half + beyond, width, MANY, DOUBTFUL)
+        strict = DOUBTFUL if model[6] > WIDE else 1.0
+        points = _own_points(ground, model, half + beyond, width, MANY, strict)
         if len(points) < 20:
             return "too few points"
         stride = max(1, len(points) // ENOUGH)
