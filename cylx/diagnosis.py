@@ -176,7 +176,7 @@ def check_extraction(observer: Observer | None = None) -> Check:
     remedy = "if all else is well, run 'cylx extract --debug' on a scan, and report what it says"
     try:
         from cylx.api import extract  # noqa: PLC0415  brings everything
-        from cylx.synthetic import single  # noqa: PLC0415
+        from cylx.synthetic import single  # noqa: PLC0415  slow to import
 
         found = extract(single(points=2000, seed=1).points, observer=observer or SilentObserver())
     except Exception as error:  # noqa: BLE001  whatever it is, it is what was asked for

@@ -200,7 +200,7 @@ def _tube(
     end: NDArray[np.float64],
     radius: float,
     tint: NDArray[np.float64],
-) -> Any:  # noqa: ANN401
+) -> Any:  # noqa: ANN401  open3d has no types
     """Make a tube without caps, as a mesh."""
     axis = end - start
     direction = axis / (np.linalg.norm(axis) or 1.0)

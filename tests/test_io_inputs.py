@@ -92,7 +92,7 @@ def test_a_closed_standard_input(monkeypatch):
 @pytest.mark.skipif(os.name == "nt", reason="names are Unicode there")
 def test_a_name_that_is_no_utf8_is_told_as_utf8(tmp_path):
     path = os.fsdecode(os.fsencode(tmp_path) + b"/\xff.xyz")
-    with open(path, "w") as file:  # noqa: PTH123
+    with open(path, "w") as file:  # noqa: PTH123  a path as text, as users give it
         file.write("1 2 3\n")
     assert read_cloud(path).source.file == f"{tmp_path}/?.xyz"
 

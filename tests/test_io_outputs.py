@@ -117,7 +117,7 @@ def test_a_disk_that_is_full_or_fails(at_home, number):
     assert names(at_home) == []
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no full device here")  # noqa: PTH110
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no full device here")  # noqa: PTH110  a path as text, as users give it
 def test_a_device_that_is_full():
     with pytest.raises(OutputError, match="/dev/full: cannot be written: no space left on device; free some space"):
         write_bytes("/dev/full", bytes(100))
@@ -152,7 +152,7 @@ def test_properties_that_do_not_fit_are_a_bug_of_the_caller():
 def test_permissions_are_those_of_any_new_file(at_home):
     (at_home / "plain.txt").write_text("")
     write_bytes("ours.txt", b"")
-    assert stat.S_IMODE(os.stat("ours.txt").st_mode) == stat.S_IMODE(os.stat("plain.txt").st_mode)  # noqa: PTH116
+    assert stat.S_IMODE(os.stat("ours.txt").st_mode) == stat.S_IMODE(os.stat("plain.txt").st_mode)  # noqa: PTH116  a path as text, as users give it
 
 
 @POSIX
@@ -170,7 +170,7 @@ def test_a_symbolic_link_is_followed(at_home):
 @POSIX
 def test_devices_and_pipes_are_written_to_as_they_are(at_home):
     write_bytes("/dev/null", b"1")
-    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)  # noqa: PTH116
+    assert stat.S_ISCHR(os.stat("/dev/null").st_mode)  # noqa: PTH116  a path as text, as users give it
     os.mkfifo("pipe")
     received = []
     reader = threading.Thread(target=lambda: received.append((at_home / "pipe").read_bytes()))
@@ -178,7 +178,7 @@ def test_devices_and_pipes_are_written_to_as_they_are(at_home):
     write_bytes("pipe", b"through")
     reader.join()
     assert received == [b"through"]
-    assert stat.S_ISFIFO(os.stat("pipe").st_mode)  # noqa: PTH116
+    assert stat.S_ISFIFO(os.stat("pipe").st_mode)  # noqa: PTH116  a path as text, as users give it
 
 
 @pytest.mark.parametrize("path", ["-", pytest.param("/dev/stdout", marks=POSIX)])

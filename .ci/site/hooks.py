@@ -5,7 +5,6 @@ mkdocs calls the public functions. The pages are written for a code host and sta
 
 import re
 from pathlib import Path
-from typing import Any
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -36,7 +35,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     return files
 
 
-def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:  # noqa: ANN401
+def on_page_markdown(markdown: str, page: Page, **_: object) -> str:
     """Let links lead to pages of the site, tables read as on a code host, and the Python page have all docstrings."""
     sources = {page: path for path, page in PAPERS.items()}
     source = ROOT / sources.get(page.file.src_uri, f"docs/{page.file.src_uri}")

@@ -48,7 +48,7 @@ def draw(figure: Figure, summaries: list[Summary], trials: Trials) -> bytes:
     """
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  an extra
-        from matplotlib.figure import Figure as Canvas  # noqa: PLC0415
+        from matplotlib.figure import Figure as Canvas  # noqa: PLC0415  an extra
     except ImportError:
         raise UsageError("the pictures", "matplotlib is not installed", "pip install 'cylx[plots]'") from None
     rows = [quantity for quantity in QUANTITIES if quantity in _shown(figure)]

@@ -42,7 +42,7 @@ class _Model:
 
     def __init__(self, drawing: Drawing) -> None:
         import ifcopenshell  # noqa: PLC0415  an extra
-        from ifcopenshell import guid  # noqa: PLC0415
+        from ifcopenshell import guid  # noqa: PLC0415  an extra
 
         self.compress = guid.compress
         self.file = ifcopenshell.file(schema="IFC4")

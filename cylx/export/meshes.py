@@ -155,8 +155,8 @@ def _glb(drawing: Drawing) -> bytes:
 def _colored(piece: Piece, scale: float) -> Trimesh:
     """Give the mesh of one cylinder about its middle, with a material of its colour."""
     from trimesh import Trimesh  # noqa: PLC0415  an extra
-    from trimesh.visual import TextureVisuals  # noqa: PLC0415
-    from trimesh.visual.material import PBRMaterial  # noqa: PLC0415
+    from trimesh.visual import TextureVisuals  # noqa: PLC0415  an extra
+    from trimesh.visual.material import PBRMaterial  # noqa: PLC0415  an extra
 
     corners, faces = mesh_of(piece.shape)
     color = [*(ceil(255 * _linear(part / 255) - 0.5) for part in piece.color), 255]

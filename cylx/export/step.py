@@ -24,12 +24,12 @@ def write(drawing: Drawing, suffix: str) -> Exported:
         `.step` or `.stp`.
     """
     from OCP.Interface import Interface_Static  # noqa: PLC0415  an extra
-    from OCP.Message import Message, Message_Gravity  # noqa: PLC0415
-    from OCP.STEPCAFControl import STEPCAFControl_Writer  # noqa: PLC0415
-    from OCP.STEPControl import STEPControl_Controller, STEPControl_StepModelType  # noqa: PLC0415
-    from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415
-    from OCP.TDocStd import TDocStd_Document  # noqa: PLC0415
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool  # noqa: PLC0415
+    from OCP.Message import Message, Message_Gravity  # noqa: PLC0415  an extra
+    from OCP.STEPCAFControl import STEPCAFControl_Writer  # noqa: PLC0415  an extra
+    from OCP.STEPControl import STEPControl_Controller, STEPControl_StepModelType  # noqa: PLC0415  an extra
+    from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415  an extra
+    from OCP.TDocStd import TDocStd_Document  # noqa: PLC0415  an extra
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool  # noqa: PLC0415  an extra
 
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Fail)  # it writes statistics to standard output
@@ -60,11 +60,11 @@ def write(drawing: Drawing, suffix: str) -> Exported:
 def _add(document: Any, piece: Piece) -> Any:  # noqa: ANN401  OCP has no types
     """Put a cylinder into a document and give its label."""
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder  # noqa: PLC0415  an extra
-    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt  # noqa: PLC0415
-    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor  # noqa: PLC0415
-    from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415
-    from OCP.TDataStd import TDataStd_Name  # noqa: PLC0415
-    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool  # noqa: PLC0415
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt  # noqa: PLC0415  an extra
+    from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor  # noqa: PLC0415  an extra
+    from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415  an extra
+    from OCP.TDataStd import TDataStd_Name  # noqa: PLC0415  an extra
+    from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool  # noqa: PLC0415  an extra
 
     shape = piece.shape
     place = gp_Ax2(gp_Pnt(*shape.start.tolist()), gp_Dir(*shape.direction.tolist()))

@@ -150,7 +150,7 @@ def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray
 
 def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> None:
     """Write LAS or LAZ, by way of an unnamed file where the output has no positions."""
-    from cylx.io.las_annotated import write_las  # noqa: PLC0415
+    from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
 
     header, table = extraction.cloud.source.header, extraction.cloud.table
     if header is None or table is None:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None = None) -> PointCloud:  # noqa: A002
+def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None = None) -> PointCloud:  # noqa: A002  the natural name
     """Read a point cloud with all properties of its points.
 
     Parameters
@@ -125,16 +125,16 @@ def _file_name(path: str | Path) -> str:
 def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], bytes | None]:
     """Read the table of a file, and what a LAS file has besides; readers that few need are imported late."""
     if kind == "las":
-        from cylx.io.las import read_las  # noqa: PLC0415
-        from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415
+        from cylx.io.las import read_las  # noqa: PLC0415  needs an extra, or for this alone
+        from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  needs an extra, or for this alone
 
         return read_las(source), kept_header(source, las_header(source))
     if kind == "e57":
-        from cylx.io.e57 import read_e57  # noqa: PLC0415
+        from cylx.io.e57 import read_e57  # noqa: PLC0415  needs an extra, or for this alone
 
         return read_e57(source, scan), None
     if kind == "npy":
-        from cylx.io.npy import read_npy  # noqa: PLC0415
+        from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone
 
         return read_npy(source), None
     return {"ply": read_ply, "pcd": read_pcd, "xyz": read_xyz}[kind](source), None

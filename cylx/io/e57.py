@@ -84,7 +84,7 @@ def read_e57(source: Input, scan: int | None = None) -> NDArray[np.void]:
     if source.head(8) != b"ASTM-E57":
         raise InputError(source.place, "is no E57: it does not begin with ASTM-E57", "give it its right suffix")
     require_extra("e57", source.place)
-    from pye57 import E57, libe57  # noqa: PLC0415
+    from pye57 import E57, libe57  # noqa: PLC0415  an extra
 
     try:
         with _named(source) as path, E57(str(path)) as file:
@@ -138,7 +138,7 @@ def _read(file: Any, place: str, scan: int | None) -> NDArray[np.void]:  # noqa:
 
 
 def _describe(file: Any, number: int, place: str) -> _Scan:  # noqa: ANN401  (of pye57)
-    from pye57 import libe57  # noqa: PLC0415
+    from pye57 import libe57  # noqa: PLC0415  an extra
 
     header = file.get_header(number)
     prototype = libe57.StructureNode(header.points.prototype())
@@ -174,7 +174,7 @@ def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa
 
 def _type(node: Any) -> np.dtype[Any] | None:  # noqa: ANN401  (of pye57)
     """Give the smallest type that holds all that a field may be; None if it is no number."""
-    from pye57 import libe57  # noqa: PLC0415
+    from pye57 import libe57  # noqa: PLC0415  an extra
 
     if isinstance(node, libe57.FloatNode):
         return np.dtype("f4" if node.precision() == libe57.E57_SINGLE else "f8")
@@ -195,7 +195,7 @@ def _fill(
     place: str,
 ) -> None:
     """Read the points of a scan into its part of the table."""
-    from pye57 import libe57  # noqa: PLC0415
+    from pye57 import libe57  # noqa: PLC0415  an extra
 
     for name, column in columns.items():
         if name not in scan.fields:

@@ -90,7 +90,7 @@ def quiet_laspy() -> Iterator[None]:
 
 
 def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
-    import laspy  # noqa: PLC0415
+    import laspy  # noqa: PLC0415  an extra
 
     source.file.seek(0)
     if facts.compressed:
@@ -116,7 +116,7 @@ def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
 
 def _check_chunks(source: Input, facts: LasFacts, header: Any) -> None:  # noqa: ANN401  (of laspy)
     """Check where the compressed chunks lie: lazrs takes memory for as many and as long ones as it is told of."""
-    import lazrs  # noqa: PLC0415
+    import lazrs  # noqa: PLC0415  an extra
 
     record = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
     damaged = InputError(source.place, "the table of its compressed chunks is damaged", _REMEDY)
@@ -147,11 +147,11 @@ def _whole(source: Input) -> int:
 @contextmanager
 def _told_apart(place: str) -> Iterator[None]:
     """Turn what laspy and lazrs raise on a damaged file into an error of the file."""
-    import laspy  # noqa: PLC0415
+    import laspy  # noqa: PLC0415  an extra
 
     damaged: tuple[type[Exception], ...] = (laspy.errors.LaspyException, ValueError, KeyError, IndexError)
     with suppress(ImportError):
-        import lazrs  # noqa: PLC0415
+        import lazrs  # noqa: PLC0415  an extra
 
         damaged += (lazrs.LazrsError,)
     try:

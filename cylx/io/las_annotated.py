@@ -47,7 +47,7 @@ def write_las(
     compressed : bool
         Whether to write LAZ.
     """
-    import laspy  # noqa: PLC0415
+    import laspy  # noqa: PLC0415  an extra
 
     with quiet_laspy():
         header = laspy.LasHeader.read_from(io.BytesIO(kept), read_evlrs=True)
@@ -74,7 +74,7 @@ def write_las(
 
 def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: ANN401  (of laspy)
     """Make room for our dimensions in a header; gives the new names of dimensions, of colours under `red+`."""
-    import laspy  # noqa: PLC0415
+    import laspy  # noqa: PLC0415  an extra
 
     point_format = header.point_format
     taken = [*point_format.dimension_names, *_OURS]

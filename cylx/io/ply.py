@@ -61,7 +61,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
     blocks : iterable of ndarray, structured
         The vertices, piece by piece.
     """
-    from plyfile import PlyData, PlyElement  # noqa: PLC0415
+    from plyfile import PlyData, PlyElement  # noqa: PLC0415  slow to import
 
     def document(rows: NDArray[np.void]) -> PlyData:
         lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
@@ -96,7 +96,7 @@ def _read_text(header: Header, source: Input) -> NDArray[np.void]:
 
 
 def _read_with_plyfile(header: Header, source: Input) -> NDArray[np.void]:
-    from plyfile import PlyData, PlyParseError  # noqa: PLC0415
+    from plyfile import PlyData, PlyParseError  # noqa: PLC0415  slow to import
 
     lines = ["ply", f"format {header.format} 1.0", *(line for item in header.elements for line in item.lines())]
     source.file.seek(header.size)

@@ -43,8 +43,8 @@ def new_figure(inches: tuple[float, float], dpi: int, *, layout: Literal["constr
         If matplotlib is not installed.
     """
     check_pictures()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
-    from matplotlib.figure import Figure  # noqa: PLC0415
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  an extra
+    from matplotlib.figure import Figure  # noqa: PLC0415  an extra
 
     class ShownFigure(Figure):  # type: ignore[misc, unused-ignore]  # without matplotlib it has no types
         """A figure that a notebook shows though pyplot does not know it."""
