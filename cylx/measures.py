@@ -153,15 +153,19 @@ def _dense(ordered: FloatArray, reach: float) -> MaskArray:
 
 
 def shape_of(shell: Shell, segment: Segment, deviation: float) -> dict[str, float]:
-    """Measure curvature against a plane, slope and bulge along the axis, and their standard errors."""
+    """Measure curvature against a plane; slope, bulge and bend along the axis, and their standard errors.
+
+    Bulge and bend are not told apart where little of the arc is seen, so each is fitted without the other.
+    """
     radius, half = float(segment.model[6]), segment.half
-    gram, right = np.zeros((7, 7)), np.zeros(7)
+    gram, right = np.zeros((9, 9)), np.zeros(9)
     _fill_shape(shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on], gram, right)
-    gram[np.diag_indices(7)] *= 1.0 + 1e-12
+    gram[np.diag_indices(9)] *= 1.0 + 1e-12
     covariance = np.linalg.pinv(gram[:5, :5], hermitian=True) * deviation**2
-    wider = np.linalg.pinv(gram, hermitian=True)
-    terms = wider @ right
+    wider = np.linalg.pinv(gram[:7, :7], hermitian=True)
+    terms = wider @ right[:7]
     errors = np.sqrt(np.maximum(np.diag(wider), 0.0)) * deviation
+    bend, bend_error = _bend(gram, right)
     return {
         "curvature": radius / math.sqrt(max(float(covariance[4, 4]), 1e-300)),
         "offset_error": math.sqrt(max(float(covariance[0, 0] + covariance[1, 1]), 0.0)),
@@ -170,25 +174,38 @@ def shape_of(shell: Shell, segment: Segment, deviation: float) -> dict[str, floa
         "slope_error": float(errors[5]) / half,
         "bulge": -2.0 * float(terms[6]) * radius / half**2,
         "bulge_error": 2.0 * float(errors[6]) * radius / half**2,
+        "bend": 2.0 * bend * radius / half**2,
+        "bend_error": 2.0 * bend_error * deviation * radius / half**2,
     }
+
+
+def _bend(gram: FloatArray, right: FloatArray) -> tuple[float, float]:
+    """Give how far the axis is off the straight at the ends, and the standard error of that for unit noise."""
+    which = np.array([0, 1, 2, 3, 4, 7, 8])
+    inverse = np.linalg.pinv(gram[np.ix_(which, which)], hermitian=True)
+    aside = (inverse @ right[which])[5:]
+    size = float(np.hypot(*aside))
+    way = aside / size if size > 0.0 else np.array([1.0, 0.0])
+    return size, math.sqrt(max(float(way @ inverse[5:, 5:] @ way), 0.0))
 
 
 @njit(cache=True, nogil=True)
 def _fill_shape(z: FloatArray, residuals: FloatArray, angles: FloatArray, gram: FloatArray, right: FloatArray) -> None:
-    """Fill the normal equations of offset (2), tilt (2), radius, slope and bulge."""
-    row, middle = np.empty(7), 0.0
+    """Fill the normal equations of offset (2), tilt (2), radius, slope, bulge and bend (2)."""
+    row, middle = np.empty(9), 0.0
     for i in range(len(z)):
         middle += z[i] * z[i] / len(z)
     for i in range(len(z)):
         row[0], row[1] = math.cos(angles[i]), math.sin(angles[i])
         row[2], row[3] = z[i] * row[0], z[i] * row[1]
         row[4], row[5], row[6] = 1.0, z[i], z[i] * z[i] - middle
-        for a in range(7):
+        row[7], row[8] = row[6] * row[0], row[6] * row[1]
+        for a in range(9):
             right[a] += row[a] * residuals[i]
             for b in range(a + 1):
                 gram[a, b] += row[a] * row[b]
-    for a in range(7):
-        for b in range(a + 1, 7):
+    for a in range(9):
+        for b in range(a + 1, 9):
             gram[a, b] = gram[b, a]
 
 

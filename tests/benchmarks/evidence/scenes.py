@@ -12,9 +12,18 @@ from pathlib import Path
 import numpy as np
 from plant import plant
 from rooms import clutter, room
+from steel import steelwork
 from tabletop import tabletop
 
-KINDS = {"room": room, "arcs": room, "correlated": room, "clutter": clutter, "plant": plant, "tabletop": tabletop}
+KINDS = {
+    "room": room,
+    "arcs": room,
+    "correlated": room,
+    "clutter": clutter,
+    "plant": plant,
+    "steelwork": steelwork,
+    "tabletop": tabletop,
+}
 
 
 def make(kind, seed, points=None):
@@ -25,7 +34,8 @@ def make(kind, seed, points=None):
     kind : str
         `room`: cylinders of any coverage among everything that is none; `arcs`: the same with 25 to 120 degrees of
         most of them; `correlated`: the same with noise that neighbours share; `clutter`: `cylx.synthetic.multi`;
-        `plant`: a rack of pipes from four viewpoints; `tabletop`: household things, as a depth camera sees them.
+        `plant`: a rack of pipes from four viewpoints; `steelwork`: rolled sections and a few pipes, likewise;
+        `tabletop`: household things, as a depth camera sees them.
     seed : int
     points : int, optional
         About how many; by default 50 000 to 400 000, drawn at random.
