@@ -15,13 +15,9 @@ from cylx.records import Ground, Segment
 FloatArray = NDArray[np.float64]
 MaskArray = NDArray[np.bool_]
 
-PIECES = 10
-"""Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
 TRUNCATED = 0.9866
 """Standard deviation of a Gaussian cut off at three sigmas."""
 SECTORS = 36
-ARC_SHARE = 0.3
-"""Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
 PLACES = 12.0
 """More places than these about an axis tell no more."""
 GAP = 4.0
@@ -92,17 +88,19 @@ def covered_angle(angles: FloatArray) -> float:
     if len(angles) == 0:
         return 0.0
     fine = int(np.clip(len(angles) // 20, SECTORS, 360))
-    return float(_filled(angles, fine).mean()) * 2.0 * math.pi
+    return float(filled_sectors(angles, fine).mean()) * 2.0 * math.pi
 
 
-def _filled(angles: FloatArray, sectors: int, share: float = 0.15) -> MaskArray:
+def filled_sectors(angles: FloatArray, sectors: int, share: float = 0.15) -> MaskArray:
+    """Tell which sectors hold more than a share of what a typical filled one does."""
     index = ((angles / (2.0 * np.pi) + 0.5) * sectors).astype(np.int64) % sectors
     counts = np.bincount(index, minlength=sectors)
     return np.asarray(counts > max(0.5, share * float(np.median(counts[counts > 0]))), dtype=np.bool_)
 
 
-def _sector(angles: FloatArray) -> NDArray[np.int64]:
-    return ((angles / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
+def sector_of(angles: FloatArray) -> NDArray[np.int64]:
+    """Give the sector, of `SECTORS`, that each angle (radians) lies in."""
+    return np.floor((angles / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
 
 
 def distinct_places(angles: FloatArray, radius: float, deviation: float) -> float:
@@ -224,72 +222,3 @@ def lack_of_fit(shell: Shell, deviation: float) -> tuple[float, float]:
     variance = max(deviation**2, 1e-300)  # points may lie on the surface exactly
     excess = max(0.0, (squares - float(full.sum()) * variance) / float(counts[full].sum()))
     return squares / variance / max(int(full.sum()) - 5, 1), math.sqrt(excess)
-
-
-def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
-    """Give points inside and just outside as shares of those on the surface, medians over pieces of the height.
-
-    Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
-    """
-    piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES).astype(np.int64), 0, PIECES - 1)
-    outer = max(0.5 * radius, 10.0 * shell.deviation)
-    on = np.abs(shell.residuals) < 3.0 * shell.deviation
-    inside = shell.residuals < -4.0 * shell.deviation
-    outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
-    counts = [np.bincount(piece[mask], minlength=PIECES) for mask in (on, inside, outside)]
-    full = counts[0] >= 1
-    if not full.any():
-        return 1.0, 1.0
-    return (
-        float(np.median(counts[1][full] / counts[0][full])),
-        float(np.median(counts[2][full] / counts[0][full])),
-    )
-
-
-def continuation(shell: Shell, radius: float) -> float:
-    """Give the density of points that go on tangentially past an end of the arc, as a share of the arc's own.
-
-    A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends. Of arcs of more
-    than half a turn, that is the lesser of the two.
-    """
-    middle = np.abs(shell.heights) <= 0.8
-    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
-    closed = _filled(shell.angles[on], SECTORS, ARC_SHARE) if on.any() else np.zeros(SECTORS, np.bool_)
-    for _ in range(2):  # gaps of up to two sectors are not ends
-        for step in (1, 2):
-            closed |= np.roll(closed, 1) & np.roll(closed, -step)
-    if closed.all() or not closed.any():
-        return 0.0
-    start, length = _longest_run(closed)
-    if length >= SECTORS - 3:
-        return 0.0
-    width = 2.0 * math.pi / SECTORS
-    counts = np.bincount(_sector(shell.angles[on]), minlength=SECTORS)
-    density = max(float(counts[(start + np.arange(length)) % SECTORS].sum()) / length, 1e-9)
-    low = -math.pi + start * width
-    # sectors that are a little filled count as arc, so that it may have ended up to this much before
-    reach, early = math.radians(20.0), math.radians(25.0)
-    shares = []
-    for end, sign in ((low, -1.0), (low + length * width, 1.0)):
-        past = (sign * (shell.angles - end) + math.pi) % (2.0 * math.pi) - math.pi
-        least = radius * (1.0 / np.cos(np.clip(past, 0.0, reach)) - 1.0) - 4.0 * shell.deviation
-        most = radius * (1.0 / np.cos(np.clip(past, 0.0, reach) + early) - 1.0) + 4.0 * shell.deviation
-        # what is within three deviations is the surface itself, seen less often there
-        least = np.maximum(least, 3.0 * shell.deviation)
-        along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
-        shares.append(float(along.sum()) / (reach / width) / density)
-    # an edge turns by less than half a turn; of more, both ends would have to go on
-    return max(shares) if closed.sum() <= SECTORS // 2 else min(shares)
-
-
-def _longest_run(filled: MaskArray) -> tuple[int, int]:
-    """Give start and length of the longest cyclic run of True; not all are True."""
-    best = (0, 0)
-    count = len(filled)
-    for start in np.flatnonzero(filled & ~np.roll(filled, 1)):
-        length = 0
-        while length < count and filled[(start + length) % count]:
-            length += 1
-        if length > best[1]:
-            best = (int(start), length)
-    return best

@@ -16,15 +16,14 @@ from cylx.config import VerificationConfig
 from cylx.evidence import weigh
 from cylx.measures import (
     TRUNCATED,
-    continuation,
     covered_angle,
     distinct_places,
-    emptiness,
     lack_of_fit,
     look_at,
     shape_of,
 )
 from cylx.records import Ground, Segment
+from cylx.surroundings import continuation, emptiness, flank
 
 LEAST = 20
 """Points on the surface without which nothing can be measured."""
@@ -108,6 +107,7 @@ def verify(
         "inside": inside,
         "outside": outside,
         "tangent": continuation(shell, radius),
+        "flank": flank(shell, radius),
         "places": distinct_places(shell.angles[shell.on], radius, deviation),
         "curvature": shape["curvature"],
         "slope": shape["slope"] * along,

@@ -19,8 +19,11 @@ from scores import average_precision, brier, calibration, cylinders_found, log_l
 sys.path.append(str(Path(__file__).parents[1]))
 from tables import number, print_header, print_row
 
+from cylx.config import VerificationConfig
 from cylx.evidence import TERMS
 
+LEAST = VerificationConfig().min_inliers
+"""Fits of fewer points are refused whatever their confidence, so that it need not be right for them."""
 BARS = (0.3, 0.5, 0.7, 0.9)
 PICTURE = Path(__file__).parents[3] / "docs" / "pictures" / "calibration.png"
 
@@ -38,8 +41,8 @@ def read_rows(paths):
 
 
 def table_of(lines, terms=TERMS):
-    """Make of lines the rows of the regression: those that are true or false, by the values of the terms."""
-    clear = [line for line in lines if line["label"] in {TRUE, FALSE}]
+    """Make of lines the rows of the regression: those that are clearly true or false, by the values of the terms."""
+    clear = [line for line in lines if line["label"] in {TRUE, FALSE} and line["measures"]["inliers"] >= LEAST]
     values = [[term.value(line["measures"]) for term in terms] for line in clear]
     return Rows(
         terms=np.array(values, dtype=np.float64).reshape(len(clear), len(terms)),

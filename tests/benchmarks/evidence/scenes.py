@@ -14,6 +14,7 @@ from plant import plant
 from rooms import clutter, room
 from steel import steelwork
 from tabletop import tabletop
+from turned import turned
 
 KINDS = {
     "room": room,
@@ -23,6 +24,7 @@ KINDS = {
     "plant": plant,
     "steelwork": steelwork,
     "tabletop": tabletop,
+    "turned": turned,
 }
 
 
@@ -35,7 +37,7 @@ def make(kind, seed, points=None):
         `room`: cylinders of any coverage among everything that is none; `arcs`: the same with 25 to 120 degrees of
         most of them; `correlated`: the same with noise that neighbours share; `clutter`: `cylx.synthetic.multi`;
         `plant`: a rack of pipes from four viewpoints; `steelwork`: rolled sections and a few pipes, likewise;
-        `tabletop`: household things, as a depth camera sees them.
+        `tabletop`: household things, as a depth camera sees them; `turned`: solids that are nearly cylinders.
     seed : int
     points : int, optional
         About how many; by default 50 000 to 400 000, drawn at random.

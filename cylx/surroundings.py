@@ -1,0 +1,136 @@
+"""What lies about a segment: inside it, just outside, and going on from where its arc ends."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.measures import SECTORS, Shell, filled_sectors, sector_of
+
+FloatArray = NDArray[np.float64]
+MaskArray = NDArray[np.bool_]
+
+PIECES = 10
+"""Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
+THIRDS = 3
+"""Pieces of the height over which flanks are counted: what touches a pipe at one place only is none."""
+MIDDLE = 0.9
+"""Share of the height over which flanks are counted."""
+LEAST_ON = 10
+"""Points on the surface without which there is no density to compare with."""
+ARC_SHARE = 0.3
+"""Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
+
+
+def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
+    """Give points inside and just outside as shares of those on the surface, medians over pieces of the height.
+
+    Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
+    """
+    piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES).astype(np.int64), 0, PIECES - 1)
+    outer = max(0.5 * radius, 10.0 * shell.deviation)
+    on = np.abs(shell.residuals) < 3.0 * shell.deviation
+    inside = shell.residuals < -4.0 * shell.deviation
+    outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
+    counts = [np.bincount(piece[mask], minlength=PIECES) for mask in (on, inside, outside)]
+    full = counts[0] >= 1
+    if not full.any():
+        return 1.0, 1.0
+    return (
+        float(np.median(counts[1][full] / counts[0][full])),
+        float(np.median(counts[2][full] / counts[0][full])),
+    )
+
+
+def continuation(shell: Shell, radius: float) -> float:
+    """Give the density of points that go on tangentially past an end of the arc, as a share of the arc's own.
+
+    A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends. Of arcs of more
+    than half a turn, that is the lesser of the two.
+    """
+    middle = np.abs(shell.heights) <= 0.8
+    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
+    closed = filled_sectors(shell.angles[on], SECTORS, ARC_SHARE) if on.any() else np.zeros(SECTORS, np.bool_)
+    for _ in range(2):  # gaps of up to two sectors are not ends
+        for step in (1, 2):
+            closed |= np.roll(closed, 1) & np.roll(closed, -step)
+    if closed.all() or not closed.any():
+        return 0.0
+    start, length = _longest_run(closed)
+    if length >= SECTORS - 3:
+        return 0.0
+    width = 2.0 * math.pi / SECTORS
+    counts = np.bincount(sector_of(shell.angles[on]), minlength=SECTORS)
+    density = max(float(counts[(start + np.arange(length)) % SECTORS].sum()) / length, 1e-9)
+    low = -math.pi + start * width
+    # sectors that are a little filled count as arc, so that it may have ended up to this much before
+    reach, early = math.radians(20.0), math.radians(25.0)
+    shares = []
+    for end, sign in ((low, -1.0), (low + length * width, 1.0)):
+        past = (sign * (shell.angles - end) + math.pi) % (2.0 * math.pi) - math.pi
+        least = radius * (1.0 / np.cos(np.clip(past, 0.0, reach)) - 1.0) - 4.0 * shell.deviation
+        most = radius * (1.0 / np.cos(np.clip(past, 0.0, reach) + early) - 1.0) + 4.0 * shell.deviation
+        # what is within three deviations is the surface itself, seen less often there
+        least = np.maximum(least, 3.0 * shell.deviation)
+        along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
+        shares.append(float(along.sum()) / (reach / width) / density)
+    # an edge turns by less than half a turn; of more, both ends would have to go on
+    return max(shares) if closed.sum() <= SECTORS // 2 else min(shares)
+
+
+def flank(shell: Shell, radius: float) -> float:
+    """Give how densely points lie on a half plane that touches the cylinder and goes off to one side.
+
+    Sides of edges and plates are such half planes. A point beyond the surface lies on two tangents, one that touches it
+    to its left and one to its right; of all points of a half plane, one of the two touches at the same place. A pipe on
+    a floor touches two halves of one plane, which cancel each other. Unlike `continuation` this needs no end of the
+    arc, which the surface itself hides where the radius is but a few deviations.
+
+    Parameters
+    ----------
+    shell : Shell
+    radius : float
+        Frame units.
+
+    Returns
+    -------
+    float
+        As a share of the density on the surface, beyond what chance brings; the median over three pieces of the height.
+    """
+    middle = np.abs(shell.heights) <= MIDDLE
+    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
+    if on.sum() < LEAST_ON:
+        return 0.0
+    beyond = middle & (shell.residuals > 3.0 * shell.deviation)
+    counts = np.bincount(sector_of(shell.angles[on]), minlength=SECTORS)
+    density = float(counts[counts > 0].mean()) / (2.0 * math.pi / SECTORS * radius)
+    nearest, farthest = radius + 3.0 * shell.deviation, radius + max(0.5 * radius, 10.0 * shell.deviation)
+    length = math.sqrt(farthest**2 - radius**2) - math.sqrt(nearest**2 - radius**2)
+    turn = np.arccos(radius / (radius + shell.residuals[beyond]))
+    piece = np.clip(((shell.heights[beyond] / MIDDLE + 1.0) / 2.0 * THIRDS).astype(np.int64), 0, THIRDS - 1)
+    sides = []
+    for sign in (-1.0, 1.0):
+        place = piece * SECTORS + sector_of(shell.angles[beyond] + sign * turn)
+        touching = np.bincount(place, minlength=THIRDS * SECTORS).reshape(THIRDS, SECTORS)
+        sides.append(touching + np.roll(touching, -1, axis=1))
+    best = 0.0
+    for one, other in (sides, sides[::-1]):
+        rest = np.maximum.reduce([np.roll(other, 1, axis=1), other, np.roll(other, -1, axis=1)])
+        excess = one - rest - np.sqrt(one + rest)
+        best = max(best, float(np.median(excess, axis=0).max()) / (density * length / THIRDS + 1.0))
+    return best
+
+
+def _longest_run(filled: MaskArray) -> tuple[int, int]:
+    """Give start and length of the longest cyclic run of True; not all are True."""
+    best = (0, 0)
+    count = len(filled)
+    for start in np.flatnonzero(filled & ~np.roll(filled, 1)):
+        length = 0
+        while length < count and filled[(start + length) % count]:
+            length += 1
+        if length > best[1]:
+            best = (int(start), length)
+    return best
