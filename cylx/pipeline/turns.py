@@ -20,6 +20,7 @@ from cylx.pipeline.limits import out_of_range
 from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
 from cylx.stages.averaging import average_cluster, finish, inflation, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
+from cylx.stages.extending import extend
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
 
@@ -153,6 +154,10 @@ class Turns:
         if self._config.averaging.merge:
             distinct = drop_claimed(findings, len(self._ground.points))
             pieces = merge_pieces(distinct, self._ground, self._join)
+            with ThreadPoolExecutor(self._threads) as pool:
+                longer = list(pool.map(lambda piece: extend(piece, self._ground, self._join), pieces))
+            if any(one is not other for one, other in zip(longer, pieces, strict=True)):
+                pieces = merge_pieces(longer, self._ground, self._join)
             kept = drop_claimed(pieces, len(self._ground.points))
             for before, after in ((findings, distinct), (pieces, kept)):
                 there = {id(finding) for finding in after}

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
+from cylx.geometry.extent import coordinates_of
 from cylx.records import Finding, Ground, Segment
 
 FloatArray = NDArray[np.float64]
@@ -19,7 +20,14 @@ RADIUS_RATIO = 0.75
 OFFSET = 0.3
 """Axes further apart than this, in radii, and four standard deviations are those of two pipes."""
 LOST = 1.0
-"""If the error is more than this many radii, a piece no longer says where its pipe goes on: that may be another."""
+"""If the error is more than this many radii, a piece no longer says where its pipe goes on: that may be another, unless
+there are points between the two."""
+FARTHEST = 4.0
+"""If it is more than this many, not even then."""
+BETWEEN = 12
+"""Fewest points on the surface between two pieces that tell of a pipe there, so sparse that no cluster was found."""
+DENSER = 4.0
+"""How much denser points must lie on that surface than about it."""
 IN_LINE = 9.5
 """Chi-square of four angles, which one in twenty true pairs exceeds."""
 ENOUGH = 10000
@@ -130,6 +138,17 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
     return square < IN_LINE
 
 
+def _is_bridged(ground: Ground, model: FloatArray, half: float, width: float) -> bool:
+    """Tell whether points lie on a cylinder about its middle, and next to none beside its surface."""
+    reach = model[6] + max(0.5 * model[6], 4.0 * width)
+    near = ground.cells.near_cylinder(model, -half, half, 0.0, reach)
+    _, residuals, _ = coordinates_of(ground.points, near[ground.may_be_on(near, model[6])], model)
+    on = np.abs(residuals) < width
+    areas = 4.0 * model[6] * width, reach**2 - 4.0 * model[6] * width
+    about = float((~on).sum()) * areas[0] / areas[1]
+    return bool(on.sum() >= BETWEEN and on.sum() > DENSER * about)
+
+
 def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
     """Fit one cylinder to two pieces alike in direction and radius; None if it does not explain both."""
     one, two = a.segment, b.segment
@@ -140,8 +159,9 @@ def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | Non
     if apart > OFFSET * one.model[6] + 4.0 * error:
         return None
     gap, model = abs(height) - one.half - two.half, one.model.copy()
+    lost = error > LOST * one.model[6]
     if gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]:
-        if error > LOST * one.model[6] or not _point_at_each_other(a, b):
+        if error > FARTHEST * one.model[6] or not _point_at_each_other(a, b):
             return None
         model[3:6] = across * math.copysign(1.0 / float(np.linalg.norm(across)), height)
     low, high = min(-one.half, height - two.half), max(one.half, height + two.half)
@@ -164,4 +184,6 @@ def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | Non
         distances = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))
         if (np.abs(distances - model[6]) < width).mean() < share:
             return None
+    if lost and not _is_bridged(ground, model, 0.5 * gap - abs(one.half - two.half), 0.5 * width):
+        return None
     return judge(Segment(model, half, spread), a if a.payoff >= b.payoff else b)
