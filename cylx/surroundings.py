@@ -84,9 +84,10 @@ def flank(shell: Shell, radius: float) -> float:
     """Give how densely points lie on a half plane that touches the cylinder and goes off to one side.
 
     Sides of edges and plates are such half planes. A point beyond the surface lies on two tangents, one that touches it
-    to its left and one to its right; of all points of a half plane, one of the two touches at the same place. A pipe on
-    a floor touches two halves of one plane, which cancel each other. Unlike `continuation` this needs no end of the
-    arc, which the surface itself hides where the radius is but a few deviations.
+    to its left and one to its right; of all points of a half plane, one of the two touches at the same place, and what
+    touches where more others do is taken for the one. A pipe on a floor touches two halves of one plane, which cancel
+    each other. Unlike `continuation` this needs no end of the arc, which the surface itself hides where the radius is
+    but a few deviations.
 
     Parameters
     ----------
@@ -110,15 +111,17 @@ def flank(shell: Shell, radius: float) -> float:
     length = math.sqrt(farthest**2 - radius**2) - math.sqrt(nearest**2 - radius**2)
     turn = np.arccos(radius / (radius + shell.residuals[beyond]))
     piece = np.clip(((shell.heights[beyond] / MIDDLE + 1.0) / 2.0 * THIRDS).astype(np.int64), 0, THIRDS - 1)
+    places = [sector_of(shell.angles[beyond] + sign * turn) for sign in (-1.0, 1.0)]
+    popular = [np.bincount(place, minlength=SECTORS)[place] for place in places]
     sides = []
-    for sign in (-1.0, 1.0):
-        place = piece * SECTORS + sector_of(shell.angles[beyond] + sign * turn)
-        touching = np.bincount(place, minlength=THIRDS * SECTORS).reshape(THIRDS, SECTORS)
-        sides.append(touching + np.roll(touching, -1, axis=1))
+    for place, chosen in zip(places, (popular[0] >= popular[1], popular[1] > popular[0]), strict=True):
+        counts = np.bincount((piece * SECTORS + place)[chosen], minlength=THIRDS * SECTORS)
+        sides.append(counts.reshape(THIRDS, SECTORS))
     best = 0.0
     for one, other in (sides, sides[::-1]):
-        rest = np.maximum.reduce([np.roll(other, 1, axis=1), other, np.roll(other, -1, axis=1)])
-        excess = one - rest - np.sqrt(one + rest)
+        here = one + np.roll(one, -1, axis=1)  # the place may be at the border of two sectors
+        rest = sum(np.roll(other, shift, axis=1) for shift in (1, 0, -1, -2))
+        excess = here - rest - np.sqrt(here + rest)
         best = max(best, float(np.median(excess, axis=0).max()) / (density * length / THIRDS + 1.0))
     return best
 

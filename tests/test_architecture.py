@@ -13,7 +13,7 @@ EVERYTHING = {
     "evaluation", "evidence", "experiments", "export", "fitting", "game", "geometry", "io", "json_parts", "measures",
     "noise",
     "open3d_door", "palette", "payoff", "pipeline", "records", "rejections", "report", "results", "scene", "selection",
-    "stages", "synthetic", "tables",
+    "stages", "surroundings", "synthetic", "tables",
 }  # fmt: skip
 MAY_IMPORT = {
     "cylx": EVERYTHING - {"cli"},
@@ -33,6 +33,7 @@ MAY_IMPORT = {
     "baselines": {"config", "errors", "geometry", "measures", "open3d_door", "records"},
     "stages": {
         "catalogue", "config", "consensus", "errors", "evidence", "game", "geometry", "measures", "payoff", "records",
+        "surroundings",
     },
     "noise": {"geometry"},
     "payoff": {"game", "geometry"},
@@ -42,6 +43,7 @@ MAY_IMPORT = {
     "json_parts": {"records"},
     "report": {"config", "cylx", "errors", "geometry", "json_parts", "palette", "records", "rejections", "results"},
     "selection": {"errors", "records"},
+    "surroundings": {"measures"},
     "tables": {"errors"},
     "io": {"errors", "geometry", "open3d_door", "palette", "records"},
     "open3d_door": set(),

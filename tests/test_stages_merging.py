@@ -1,5 +1,7 @@
 """Pieces of one pipe become one cylinder, and neighbours stay two."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -141,3 +143,29 @@ def claims(*parts):
 def test_what_better_ones_have_claimed_is_dropped(parts, kept):
     findings = claims(*parts)
     assert {id(one) for one in drop_claimed(findings, 200)} == {id(findings[k]) for k in kept}
+
+
+def far_pieces(between, tilt=0.0012):
+    """Give what becomes of two pieces so far apart that their directions alone do not say they are one."""
+    rng = np.random.default_rng(3)
+    ends = [Mantle(pipe(*ends), 0.0, 2 * np.pi).sample(rng, 300) for ends in ((0.0, 3.0), (400.0, 403.0))]
+    clean = np.concatenate([*ends, between])
+    points = clean + SIGMA * rng.standard_normal(clean.shape)
+    frame, _ = make_frame(points, Config())
+    noise = Noise(np.ones(1), np.array([SIGMA / frame.spacing]))
+    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
+    findings = []
+    for k, (low, sign) in enumerate(((0.0, 1.0), (400.0, -1.0))):
+        direction = (np.sin(sign * tilt), 0, np.cos(tilt))
+        own = np.flatnonzero((frame.order >= 300 * k) & (frame.order < 300 * (k + 1)))
+        shape = pipe(low, low + 3.0, direction=direction)
+        findings.append(replace(finding(shape, own, frame, error=0.01), tilt_error=0.004))
+    return merge_pieces(findings, ground, accept(ground))
+
+
+def test_far_pieces_are_joined_if_there_are_points_between_them():
+    rng = np.random.default_rng(4)
+    assert len(far_pieces(Mantle(pipe(3.0, 400.0), 0.0, 2 * np.pi).sample(rng, 40))) == 1
+    assert len(far_pieces(np.empty((0, 3)))) == 2
+    beside = rng.uniform([-1.5, -1.5, 3.0], [1.5, 1.5, 400.0], (400, 3))
+    assert len(far_pieces(beside)) == 2

@@ -52,6 +52,9 @@ def test_a_cylinder_passes_and_shows_nothing_else():
     assert measures["curvature"] > 1000
     assert abs(measures["slope"]) < 4 * measures["slope_error"]
     assert abs(measures["bulge"]) < 4 * measures["bulge_error"]
+    assert measures["bend"] < 4 * measures["bend_error"]
+    assert measures["flank"] == 0.0
+    assert np.isclose(measures["radius_noises"], 1.0 / SIGMA, rtol=0.1)
     assert np.isclose(measures["height_radii"], 4.0)
     assert np.isclose(verdict.coverage, 2 * np.pi, rtol=0.02)
     assert 2900 < len(verdict.points) <= 3000
@@ -126,6 +129,53 @@ def test_sides_that_go_on_show_a_rounded_edge():
     assert judge(points[:1200], sigma=sigma).measures["tangent"] < 0.05
     assert judge(points[:2000], sigma=sigma).measures["tangent"] > 0.5  # the other side may be hidden
     assert judge(points, sigma=sigma).measures["tangent"] > 0.5
+
+
+@pytest.mark.parametrize("bend", [0.01, 0.02, 0.03])
+def test_a_bent_pipe_shows_its_bend_and_no_bulge(bend):
+    straight = pipe(n=6000)
+    offset = 0.5 * bend * straight[:, 2] ** 2
+    measures = judge(straight + np.outer(offset - offset.mean(), [0.6, 0.8, 0.0])).measures
+    assert 0.8 * bend < measures["bend"] < 1.1 * bend  # what is bent furthest no longer counts as on the surface
+    assert abs(measures["bulge"]) < 4 * measures["bulge_error"] + 0.01
+
+
+def test_a_straight_pipe_bends_no_more_than_its_standard_error_says():
+    ratios = []
+    for seed in range(30):
+        points = noisy(Mantle(Cylinder((0, 0, 0), UP, 1.0, 4.0), 0.0, 2 * np.pi), 1000, seed)
+        measures = judge(points).measures
+        ratios.append(measures["bend"] / measures["bend_error"])
+    # the length of a vector of two independent normals: its square has a mean of two
+    assert np.mean(np.square(ratios)) == pytest.approx(2.0, abs=1.2)
+
+
+def edge(radius, width=4.0, n=1500):
+    """Give a sharp edge along z, its sides going off at 45 degrees, and the circle that fits into it best."""
+    rng = np.random.default_rng(6)
+    away, heights = rng.uniform(0, width, (2, n)), rng.uniform(-2, 2, (2, n))
+    sides = [np.column_stack([-a, sign * a, h]) for a, h, sign in zip(away, heights, (-1, 1), strict=True)]
+    return np.concatenate(sides) / [np.sqrt(2), np.sqrt(2), 1] + [np.sqrt(2) * radius, 0, 0]
+
+
+@pytest.mark.parametrize("noises", [5.0, 8.0, 12.0])
+def test_the_sides_of_an_edge_are_flanks_however_thin_the_cylinder(noises):
+    sigma = 1.0 / noises
+    points = edge(1.0) + sigma * np.random.default_rng(7).standard_normal((3000, 3))
+    assert judge(points, sigma=sigma).measures["flank"] > 0.4
+    one_side = points[:1500]
+    assert judge(one_side, sigma=sigma).measures["flank"] > 0.4
+
+
+def test_a_floor_a_crossing_plate_and_stray_points_are_no_flanks():
+    rng = np.random.default_rng(8)
+    across, along = rng.uniform(-4, 4, (2, 3000)), rng.uniform(-2, 2, (2, 3000))
+    floor = np.column_stack([across[0], np.full(3000, -1.0), along[0]])
+    plate = np.column_stack([across[0], across[1], np.full(3000, 0.5)])
+    strays = rng.uniform(-2, 2, (3000, 3))
+    assert judge(pipe()).measures["flank"] == 0.0
+    for other in (floor, plate[np.hypot(*plate[:, :2].T) > 1], strays):
+        assert judge(np.concatenate([pipe(), other])).measures["flank"] < 0.15
 
 
 @pytest.mark.parametrize(

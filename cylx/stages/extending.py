@@ -8,6 +8,7 @@ are the pipe's, and tell its direction far better than the piece does.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,9 @@ from numpy.typing import NDArray
 from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
 from cylx.geometry.extent import coordinates_of
 from cylx.records import Finding, Ground, Segment
-from cylx.stages.merging import Judge
 
 FloatArray = NDArray[np.float64]
+Judge = Callable[[Segment, Finding], Finding | None]
 
 ROUNDS = 6
 REACH = 0.5

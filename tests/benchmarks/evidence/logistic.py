@@ -70,7 +70,7 @@ def balanced_weights(rows):
     return share * (share.sum() / len(kinds) / totals)[which.reshape(-1)]
 
 
-def fit_law(rows, signs, strength=STRENGTH):
+def fit_law(rows, signs, strength=STRENGTH, caution=CAUTION):
     """Fit the most likely law whose weights have the given signs, or are zero.
 
     Parameters
@@ -78,8 +78,8 @@ def fit_law(rows, signs, strength=STRENGTH):
     rows : Rows
     signs : ndarray of shape (K,)
         1 or -1 for each term; a weight of zero keeps its sign.
-    strength : float
-        See `STRENGTH`.
+    strength, caution : float
+        See `STRENGTH` and `CAUTION`.
 
     Returns
     -------
@@ -88,7 +88,7 @@ def fit_law(rows, signs, strength=STRENGTH):
     middle, width = rows.terms.mean(axis=0), rows.terms.std(axis=0)
     width = np.where(width > 0, width, 1.0)  # a term that never changes gets no weight, by the penalty
     standard = (rows.terms - middle) / width
-    share = balanced_weights(rows) * np.where(rows.true, 1.0, CAUTION)
+    share = balanced_weights(rows) * np.where(rows.true, 1.0, caution)
     side = np.where(rows.true, 1.0, -1.0)
 
     def loss(parameters):
@@ -117,11 +117,11 @@ def folds_of(scenes, folds=FOLDS, seed=0):
     return (order % folds)[which.reshape(-1)]
 
 
-def cross_validated(rows, signs, folds=FOLDS):
+def cross_validated(rows, signs, folds=FOLDS, caution=CAUTION):
     """Give the probability of each row by a law that was fitted without its scene."""
     fold = folds_of(rows.scenes, folds)
     probability = np.zeros(len(rows.true))
     for k in np.unique(fold):
-        law = fit_law(rows.subset(fold != k), signs)
+        law = fit_law(rows.subset(fold != k), signs, caution=caution)
         probability[fold == k] = law.probability(rows.terms[fold == k])
     return probability
