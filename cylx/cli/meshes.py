@@ -37,10 +37,12 @@ def check_meshes(names: Sequence[str], units: str | None) -> None:
     UsageError
         If a suffix is that of no mesh, or the unit or the library is missing, or there is no mesh for the unit.
     """
+    if not names:
+        if units is not None:
+            raise UsageError("--units", "is that of a mesh, and none is asked for", "give --mesh FILE, or leave it out")
+        return
     from cylx.export import format_of
 
-    if units is not None and not names:
-        raise UsageError("--units", "is that of a mesh, and none is asked for", "give --mesh FILE, or leave it out")
     for name in names:
         known = format_of(name)
         if known.home != "meshes":

@@ -14,6 +14,7 @@ from cylx.errors import OutputError, UsageError
 
 if TYPE_CHECKING:
     from cylx.records import Extraction, PointCloud
+    from cylx.results import Result
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
 REPORT, PICTURE, MESH = ".report.html", ".cylinders.png", ".cylinders.obj"
@@ -169,6 +170,15 @@ def check_format(job: Job, cloud: PointCloud) -> None:
         check_annotated(job.annotated, cloud)
 
 
+def _mesh(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
+    """Make the mesh that is asked for, and what its reader has to know."""
+    if job.mesh is None:
+        return None, []
+    from cylx.cli.meshes import mesh_of
+
+    return mesh_of(job.mesh, content.cylinders, job.units)
+
+
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]:
     """Write the JSON, and what else was asked for of one scan, all or nothing.
 
@@ -182,14 +192,12 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
     OutputError
         If one of them cannot be written.
     """
-    from cylx.cli.meshes import mesh_of
     from cylx.io import write_annotated, write_bytes, write_text
-    from cylx.rejections import Rejections
     from cylx.results import Result
 
     content = Result.of(extraction)
     page, picture = _looks(job, extraction)
-    mesh, remarks = (None, []) if job.mesh is None else mesh_of(job.mesh, content.cylinders, job.units)
+    mesh, remarks = _mesh(job, content)
     with contextlib.ExitStack() as stack:
 
         def staged(name: str) -> str | Path:
@@ -200,6 +208,8 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
         if job.annotated is not None:
             write_annotated(staged(job.annotated), extraction, overwrite=overwrite)
         if job.rejected is not None:
+            from cylx.rejections import Rejections
+
             write_text(staged(job.rejected), Rejections.of(extraction).to_json(), overwrite=overwrite)
         if job.report is not None:
             write_text(staged(job.report), page, overwrite=overwrite)
