@@ -141,9 +141,20 @@ def shape_faults(module, source, tree):
                 yield f"{module}:{node.lineno}: {node.name} has {length} lines of code, at most {MOST_LINES_OF_CODE}"
 
 
+def kernel_faults(module, tree):
+    """Find what makes a kernel slow to compile: of arrays that differ in shape Numba can tell, with seconds of code."""
+    for kernel in ast.walk(tree):
+        if isinstance(kernel, ast.FunctionDef) and any("njit" in ast.unparse(one) for one in kernel.decorator_list):
+            for node in ast.walk(kernel):
+                targets = node.targets if isinstance(node, ast.Assign) else []
+                places = [target.slice for target in targets if isinstance(target, ast.Subscript)]
+                if any(isinstance(part, ast.Slice) for place in places for part in ast.walk(place)):
+                    yield f"{module}:{node.lineno}: kernel {kernel.name} assigns a slice"
+
+
 def faults(module, source):
     tree = ast.parse(source)
-    return [*import_faults(module, tree), *shape_faults(module, source, tree)]
+    return [*import_faults(module, tree), *shape_faults(module, source, tree), *kernel_faults(module, tree)]
 
 
 def module_name(path):
@@ -183,6 +194,7 @@ def test_the_whole_house_is_looked_at():
         ("cylx.game", "from .geometry import plane", "relative import"),
         ("cylx.attic", "", "a new room"),
         ("cylx.io.utils", "", "'utils' is no name of a room"),
+        ("cylx.game", "@njit(cache=True)\ndef f(a, b):\n    a[0, :7] = b", "kernel f assigns a slice"),
         ("cylx.io.ply", "\n" * 321, "321 lines, at most 320"),
         ("cylx.io.ply", "def f():\n" + "    x = 1\n" * 60, "f has 61 lines of code, at most 60"),
     ],

@@ -199,7 +199,8 @@ def _slice_windows(
                 fits = fits or fit == 2
                 if fit == 2 and quality[0] > rows[s, 7]:
                     move_to_foot(model, seed)
-                    rows[s, :7] = model
+                    for d in range(7):  # assigning a slice takes seconds to compile, for its message on shapes
+                        rows[s, d] = model[d]
                     rows[s, 7], rows[s, 8] = quality[0], quality[1]
             counts[3] += 0 if fits else 1
 
