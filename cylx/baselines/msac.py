@@ -126,7 +126,8 @@ def _search(
         loss = _loss(points, model, distance, record)
         if loss < record:
             record = loss
-            best[:] = model
+            for d in range(len(best)):
+                best[d] = model[d]
     return record
 
 
