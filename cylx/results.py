@@ -32,7 +32,7 @@ from cylx.json_parts import (
 from cylx.tables import dataframe_of
 
 if TYPE_CHECKING:
-    from cylx.records import CylinderFit, Extraction, StageReport
+    from cylx.records import CylinderFit, Extraction, Scene, StageReport
 
 
 class SceneScale(Part):
@@ -42,6 +42,16 @@ class SceneScale(Part):
     """Typical distance of neighbouring points on a surface, scene units."""
     noise: Length
     """Standard deviation of the points about their surface, scene units."""
+    given: Annotated[list[Literal["spacing", "noise"]], Field(min_length=1)] | None = None
+    """Which of them the configuration gave; absent if both were measured."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> SceneScale:
+        """Write down the scale of a scene."""
+        given = [name for name in ("spacing", "noise") if name in scene.given]
+        return cls.model_validate(
+            {"spacing": float(scene.spacing), "noise": float(scene.noise), "given": given or None}
+        )
 
 
 class Stage(Part):
@@ -217,7 +227,7 @@ class Result(Part):
             input=Input.of(extraction),
             method=extraction.config.method,
             config=extraction.config.model_dump(mode="json"),
-            scene=SceneScale(spacing=float(extraction.scene.spacing), noise=float(extraction.scene.noise)),
+            scene=SceneScale.of(extraction.scene),
             stages=[_stage(report) for report in extraction.stages],
             cylinders=[ResultCylinder.of(i, fit) for i, fit in enumerate(extraction.cylinders)],
             warnings=list(extraction.warnings),
@@ -248,7 +258,7 @@ class Result(Part):
     def to_object(self) -> dict[str, Any]:
         """Give the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        drop_missing([content["input"]])
+        drop_missing([content["input"], content["scene"]])
         return content | {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
 
     def __repr__(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
@@ -46,6 +47,7 @@ def extract_by_competitor(cloud: PointCloud, config: Config, threads: int, journ
     """
     with journal.stage("scene"):
         frame, scene = make_frame(cloud.points, config)
+        scene = replace(scene, given=config.scene.given)
         config = resolve(config, scene)
         radii = radius_range(config, frame)
         ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), frame.noise)
