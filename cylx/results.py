@@ -42,7 +42,7 @@ class SceneScale(Part):
     """Typical distance of neighbouring points on a surface, scene units."""
     noise: Length
     """Standard deviation of the points about their surface, scene units."""
-    given: Annotated[list[Literal["spacing", "noise"]], Field(min_length=1)] | None = None
+    given: list[Literal["spacing", "noise"]] | None = None
     """Which of them the configuration gave; absent if both were measured."""
 
     @classmethod
