@@ -339,6 +339,9 @@ def test_a_browser_shows_the_page_and_can_be_used(browse, hostile):
         assert (told["visible"], told["without"]) == (24, 0)
         assert told["picked"] == [0, 1]
         assert told["lit"] > 500
+        slow, *_, fast, faster = told["shares"]  # of the points, where frames take 600 ms, and 10 ms after that
+        assert 1 / 16 <= slow < 1 / 5
+        assert told["shares"][2] == 1 / 16 < fast < faster
 
 
 def test_without_webgl_the_rest_is_there(browse, extraction):
