@@ -6,6 +6,7 @@ input, configuration and seed give the same bytes.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from math import degrees, isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -254,6 +255,29 @@ class Result(Part):
         except ValidationError as error:
             path, fault, remedy = describe_fault(error, cls)
             raise InputError(": ".join(filter(None, [place, ".".join(path)])), fault, remedy) from None
+
+    @classmethod
+    def from_json(cls, text: str) -> Result:
+        """Read the text of the file, as `to_json` gives it.
+
+        Parameters
+        ----------
+        text : str
+
+        Raises
+        ------
+        InputError
+            If it is no JSON object, or not a result of this version of the format.
+        """
+        remedy = "give the text of a JSON file as cylx writes it"
+        try:
+            mapping = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            fault = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+            raise InputError("the text", f"not JSON: {fault}", remedy) from None
+        if not isinstance(mapping, dict):
+            raise InputError("the text", "holds no JSON object", remedy)
+        return cls.parse(mapping, "the text")
 
     def to_object(self) -> dict[str, Any]:
         """Give the JSON object; what was not computed is left out."""
