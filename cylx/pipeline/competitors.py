@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cylx.baselines import Proposal, find_by_consensus, find_by_growing, find_by_spheres, fit_line_of_centres
+from cylx.baselines import Limits, Proposal, find_by_consensus, find_by_growing, find_by_spheres, fit_line_of_centres
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.measures import covered_angle
@@ -76,15 +76,15 @@ def _proposals(
     if config.method == "line-fit":
         fits = ellipses_of_slices(frame, np.zeros(len(frame.points)), radii, config, threads, journal)
         return fit_line_of_centres(fits, frame, config.line_fit)
-    axis = None
+    limits = Limits(radii)
     if config.scene.axis is not None:
         along = np.array(config.scene.axis, dtype=np.float64)
-        axis = along / np.linalg.norm(along), math.radians(config.scene.axis_tolerance_deg)
+        limits = Limits(radii, along / np.linalg.norm(along), math.radians(config.scene.axis_tolerance_deg))
     if config.method == "msac":
-        return find_by_consensus(frame, radii, axis, config.msac, seed=config.seed, threads=threads)
+        return find_by_consensus(frame, limits, config.msac, seed=config.seed, threads=threads)
     if config.method == "tran":
-        return find_by_growing(frame, radii, axis, config.tran, seed=config.seed, threads=threads)
-    return find_by_spheres(frame, radii, axis, config.jin, seed=config.seed, threads=threads)
+        return find_by_growing(frame, limits, config.tran, seed=config.seed, threads=threads)
+    return find_by_spheres(frame, limits, config.jin, seed=config.seed, threads=threads)
 
 
 def _with_extent(proposal: Proposal, ground: Ground, radii: tuple[float, float], config: Config) -> Finding | Refusal:
