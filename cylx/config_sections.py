@@ -68,6 +68,11 @@ class SceneConfig(Section):
     catalogue: Annotated[list[CatalogueEntry], Field(min_length=1)] | None = None
     """Nominal radii, each `{name: DN50, radius: 0.03015, tolerance: 0.0001}`: a fit is drawn to one it bears out."""
 
+    @property
+    def given(self) -> tuple[str, ...]:
+        """Which of `spacing` and `noise` are given, and not measured."""
+        return tuple(name for name in ("spacing", "noise") if getattr(self, name) is not None)
+
     @model_validator(mode="after")
     def _check_axis(self) -> SceneConfig:
         if self.axis is not None and not any(self.axis):

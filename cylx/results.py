@@ -6,6 +6,7 @@ input, configuration and seed give the same bytes.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from math import degrees, isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -32,7 +33,7 @@ from cylx.json_parts import (
 from cylx.tables import dataframe_of
 
 if TYPE_CHECKING:
-    from cylx.records import CylinderFit, Extraction, StageReport
+    from cylx.records import CylinderFit, Extraction, Scene, StageReport
 
 
 class SceneScale(Part):
@@ -42,6 +43,16 @@ class SceneScale(Part):
     """Typical distance of neighbouring points on a surface, scene units."""
     noise: Length
     """Standard deviation of the points about their surface, scene units."""
+    given: list[Literal["spacing", "noise"]] | None = None
+    """Which of them the configuration gave; absent if both were measured."""
+
+    @classmethod
+    def of(cls, scene: Scene) -> SceneScale:
+        """Write down the scale of a scene."""
+        given = [name for name in ("spacing", "noise") if name in scene.given]
+        return cls.model_validate(
+            {"spacing": float(scene.spacing), "noise": float(scene.noise), "given": given or None}
+        )
 
 
 class Stage(Part):
@@ -217,7 +228,7 @@ class Result(Part):
             input=Input.of(extraction),
             method=extraction.config.method,
             config=extraction.config.model_dump(mode="json"),
-            scene=SceneScale(spacing=float(extraction.scene.spacing), noise=float(extraction.scene.noise)),
+            scene=SceneScale.of(extraction.scene),
             stages=[_stage(report) for report in extraction.stages],
             cylinders=[ResultCylinder.of(i, fit) for i, fit in enumerate(extraction.cylinders)],
             warnings=list(extraction.warnings),
@@ -245,10 +256,33 @@ class Result(Part):
             path, fault, remedy = describe_fault(error, cls)
             raise InputError(": ".join(filter(None, [place, ".".join(path)])), fault, remedy) from None
 
+    @classmethod
+    def from_json(cls, text: str) -> Result:
+        """Read the text of the file, as `to_json` gives it.
+
+        Parameters
+        ----------
+        text : str
+
+        Raises
+        ------
+        InputError
+            If it is no JSON object, or not a result of this version of the format.
+        """
+        remedy = "give the text of a JSON file as cylx writes it"
+        try:
+            mapping = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            fault = "nested too deeply" if isinstance(error, RecursionError) else str(error)
+            raise InputError("the text", f"not JSON: {fault}", remedy) from None
+        if not isinstance(mapping, dict):
+            raise InputError("the text", "holds no JSON object", remedy)
+        return cls.parse(mapping, "the text")
+
     def to_object(self) -> dict[str, Any]:
         """Give the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        drop_missing([content["input"]])
+        drop_missing([content["input"], content["scene"]])
         return content | {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
 
     def __repr__(self) -> str:

@@ -131,6 +131,7 @@ def test_an_extraction_as_an_object_is_what_the_command_writes(make_extraction, 
     (tmp_path / "r.json").write_text(cylx.Result.of(found).to_json(), encoding="utf-8")
     assert cylx.read_result(tmp_path / "r.json").to_object() == cylx.to_dict(found)
     assert cylx.read_result(str(tmp_path / "r.json")).cylinders[1].radius == 2.0
+    assert cylx.Result.from_json(cylx.Result.of(found).to_json()) == cylx.read_result(tmp_path / "r.json")
 
 
 def test_what_is_no_result_is_named(tmp_path):
@@ -139,6 +140,21 @@ def test_what_is_no_result_is_named(tmp_path):
         cylx.read_result(tmp_path / "r.json")
     with pytest.raises(InputError, match="no such file"):
         cylx.read_result(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("", "not JSON"),
+        ("[" * 10**5, "nested too deeply"),
+        ("[]", "no JSON object"),
+        ("NaN", "no JSON object"),
+        ('{"schema": "cylx.summary/1"}', "schema: 'cylx.summary/1' is not one of its values"),
+    ],
+)
+def test_a_text_that_is_no_result_is_named(text, fault):
+    with pytest.raises(InputError, match=f"the text: .*{fault}"):
+        cylx.Result.from_json(text)
 
 
 def test_a_data_frame(make_extraction, tmp_path):

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx import api, open3d_door
-from cylx.baselines import msac
+from cylx.baselines import Limits, msac
 from cylx.baselines.jin import _search_sphere, _straight
 from cylx.baselines.line_fit import fit_line_of_centres
 from cylx.baselines.msac import _cylinder_through, _loss
@@ -517,3 +517,13 @@ def test_the_line_goes_through_the_centres_of_the_best_ellipses(seed):
     assert abs(model[3:6] @ direction) == pytest.approx(1.0, abs=1e-12)
     assert np.isclose(found.segment.half, 0.5 * np.ptp(heights))
     assert np.allclose(model[:3], point + 0.5 * (heights.min() + heights.max()) * direction)
+
+
+def test_limits_admit_directions_either_way_up_to_their_tilt():
+    upright = Limits((0.5, 2.0), np.array([0.0, 0.0, 1.0]), np.radians(10))
+    for angle, admitted in ((0, True), (9.9, True), (10.1, False), (90, False), (170.1, True), (180, True)):
+        direction = np.array([np.sin(np.radians(angle)), 0.0, np.cos(np.radians(angle))])
+        assert upright.admit(direction) == admitted
+        assert Limits((0.5, 2.0)).admit(direction)
+    np.testing.assert_allclose(upright.numbers, [0.5, 2.0, 0.0, 0.0, 1.0, np.cos(np.radians(10))])
+    assert Limits((0.5, 2.0)).numbers.tolist() == [0.5, 2.0, 0.0, 0.0, 0.0, -1.0]

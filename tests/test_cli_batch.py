@@ -47,7 +47,9 @@ def pipeline(monkeypatch, make_extraction):
             if self.bug == self.calls[-1]:
                 raise ZeroDivisionError("division by zero")
             check_usable(cloud.points, cloud.source.file)
-            scene = Scene(0.25, 0.0, float(np.linalg.norm(np.ptp(cloud.points, axis=0))))
+            known = config.scene
+            extent = float(np.linalg.norm(np.ptp(cloud.points, axis=0)))
+            scene = Scene(known.spacing or 0.25, known.noise or 0.0, extent, known.given)
             extraction = make_extraction(cloud, resolve(config, scene), cylinders=self.found)
             return dataclasses.replace(extraction, scene=scene)
 
@@ -307,6 +309,11 @@ def edit(folder, stem, change):
         ([], ["--method", "msac"], True),
         (["--axis", "z"], ["--axis", "x"], True),
         (["--set", "scene.noise=0.125"], ["--set", "scene.noise=0.25"], True),
+        (["--set", "scene.noise=0.125"], ["--set", "scene.noise=0.125"], False),
+        (["--set", "scene.noise=0.125"], [], True),
+        (["--set", "scene.spacing=0.5"], [], True),
+        ([], ["--set", "scene.spacing=0.25"], True),
+        (["--set", "scene.spacing=0.25"], ["--set", "scene.noise=0.125", "--set", "scene.spacing=0.25"], True),
         (["--set", "scene.catalogue=[{radius: 1}]"], ["--set", "scene.catalogue=[{radius: 1}]"], False),
         (["--axis", "z", "--radius", "1:2"], ["--radius", "1:2", "--set", "scene.axis=[0, 0, 1]"], False),
         (["--seed", "3"], ["--threads", "1", "--seed", "3"], False),
@@ -317,6 +324,41 @@ def test_other_settings_make_stale(run_cylx, scans, pipeline, before, after, sta
     pipeline.calls = ()
     extract(run_cylx, *after, "--resume")
     assert len(pipeline.calls) == (18 if stale else 1)
+
+
+def test_a_mesh_in_another_unit_or_of_another_result_is_stale(run_cylx, scans, tmp_path, pipeline):
+    def calls(units, *options):
+        pipeline.calls = ()
+        options = ("--no-annotate", "--mesh", "can.glb", "--units", units, *options)
+        assert run_cylx("extract", "scans/00.xyz", *options, "--resume").exit_code == 0
+        return len(pipeline.calls)
+
+    assert [calls("mm"), calls("mm")] == [1, 0]
+    in_mm = Path("can.glb").read_bytes()
+    assert [calls("m"), calls("m")] == [1, 0]
+    assert Path("can.glb").read_bytes() != in_mm
+    Path("can.glb").write_bytes(in_mm)
+    assert calls("m") == 1
+    pipeline.found = 0
+    assert run_cylx("extract", "scans/00.xyz", "--no-annotate", "--overwrite").exit_code == 0
+    assert calls("m") == 1  # none is found, and so there must be no mesh
+    assert not Path("can.glb").exists()
+
+
+@pytest.mark.parametrize("spoil", [b"{}", b"", None])
+def test_what_was_rejected_in_another_run_is_stale(run_cylx, scans, tmp_path, pipeline, spoil):
+    options = ("extract", "scans/00.xyz", "--no-annotate", "--rejected", "r.json")
+    run_cylx(*options)
+    before = Path("r.json").read_bytes()
+    if spoil is None:
+        run_cylx("extract", "scans/00.xyz", "--no-annotate", "--overwrite", "--seed", 1)
+        assert run_cylx(*options, "--resume", "--seed", 1).exit_code == 0
+        assert b'"seed": 1' in Path("r.json").read_bytes()
+        assert len(pipeline.calls) == 3
+    else:
+        Path("r.json").write_bytes(spoil)
+        assert run_cylx(*options, "--resume", "--overwrite").exit_code == 0
+        assert Path("r.json").read_bytes() == before
 
 
 def test_what_was_interrupted_goes_on_to_the_same_bytes(run_cylx, scans, tmp_path, pipeline):

@@ -239,7 +239,7 @@ def test_a_folder_in_the_place_of_a_file_is_refused(run_cylx, tmp_path, small, a
 def test_without_matplotlib_nothing_is_run(run_cylx, tmp_path, small, at_once, monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     failed = run_cylx("reproduce", 7, "--out", tmp_path)
-    line = "cylx: the pictures: matplotlib is not installed; pip install 'cylx[plots]'\n"
+    line = "cylx: the picture: matplotlib is not installed; pip install 'cylx[plots]'\n"
     assert (failed.exit_code, failed.stderr, at_once) == (2, line, [])
     assert names(tmp_path) == []
 

@@ -341,10 +341,10 @@ def test_every_kind_of_figure_is_drawn_however_much_of_it_is_there(number):
 
 
 def test_without_matplotlib_it_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib.backends.backend_agg", None)
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
     with pytest.raises(UsageError) as refused:
         draw(FIGURES[7], summarize(FIGURES[7], {}), {})
-    assert str(refused.value) == "the pictures: matplotlib is not installed; pip install 'cylx[plots]'"
+    assert str(refused.value) == "the picture: matplotlib is not installed; pip install 'cylx[plots]'"
 
 
 # scenes of cans

@@ -21,6 +21,7 @@ from cylx.export import METRES, draw, format_of, render
 from cylx.export.formats import FORMATS
 from cylx.export.meshes import SIDES, Z_UP
 from cylx.geometry.cylinder import Cylinder
+from cylx.open3d_door import import_open3d
 from cylx.palette import cylinder_colors
 from cylx.results import ResultCylinder
 
@@ -163,6 +164,17 @@ def test_glb_is_read_by_hand_and_by_trimesh(origin, unit):
         check_mesh(mesh, shape.moved(origin), scale, tolerance=1e-5)
 
 
+@pytest.mark.parametrize("suffix", [".ply", ".stl", ".obj", ".glb"])
+def test_meshes_are_read_by_open3d(suffix, tmp_path):
+    library(suffix)
+    (tmp_path / f"out{suffix}").write_bytes(export(suffix).data)
+    mesh = import_open3d().io.read_triangle_mesh(str(tmp_path / f"out{suffix}"))
+    assert len(mesh.triangles) == len(SHAPES) * 4 * SIDES
+    area = SIDES * np.sin(np.pi / SIDES) * sum(2 * shape.radius * shape.height for shape in SHAPES)
+    area += SIDES * np.sin(2 * np.pi / SIDES) * sum(shape.radius**2 for shape in SHAPES)
+    assert mesh.get_surface_area() == pytest.approx(area, rel=1e-5)
+
+
 # --- a table
 
 
@@ -235,8 +247,11 @@ def test_ifc_has_pipe_segments_in_the_unit_of_the_scan(origin, unit):
     from ifcopenshell.util.placement import get_local_placement
     from ifcopenshell.util.unit import calculate_unit_scale
 
-    model = ifcopenshell.file.from_string(export(".ifc", origin, unit).data.decode())
+    text = export(".ifc", origin, unit).data.decode()
+    model = ifcopenshell.file.from_string(text)
     assert model.schema == "IFC4"
+    radii = re.findall(r"IFCCIRCLEPROFILEDEF\(\.AREA\.,'cylinder \d',#\d+,(.*?)\)", text)
+    assert list(map(float, radii)) == [shape.radius for shape in SHAPES]  # read by hand, too
     assert calculate_unit_scale(model) == pytest.approx(METRES[unit])
     segments = model.by_type("IfcPipeSegment")
     assert [segment.Name for segment in segments] == ["cylinder 0", "cylinder 1", "cylinder 2"]
@@ -266,7 +281,15 @@ def test_ifc_keeps_to_its_schema():
 @pytest.mark.parametrize("unit", list(METRES))
 def test_dxf_has_centre_lines_in_the_unit_of_the_scan(origin, unit):
     ezdxf = library(".dxf")
-    document = ezdxf.read(io.StringIO(export(".dxf", origin, unit).data.decode()))
+    text = export(".dxf", origin, unit).data.decode()
+    by_hand = [re.findall(r"(?m)^ *([123][01])\n(.*)", body)[:6] for body in text.split("\nAcDbLine\n")[1:]]
+    for groups, shape in zip(by_hand, SHAPES, strict=True):
+        assert [code for code, _ in groups] == ["10", "20", "30", "11", "21", "31"]
+        ends = np.array([float(number) for _, number in groups])
+        np.testing.assert_allclose(
+            ends, np.concatenate([shape.start, shape.end]) + np.tile(origin, 2), rtol=1e-15, atol=1e-15
+        )
+    document = ezdxf.read(io.StringIO(text))
     auditor = document.audit()
     assert (auditor.errors, auditor.fixes) == ([], [])
     assert ezdxf.units.conversion_factor(document.units, ezdxf.units.M) == pytest.approx(METRES[unit])

@@ -49,6 +49,7 @@ matches = st.builds(
     free_radius=positive,
     free_radius_sd=st.just(0.0) | positive,
 )
+givens = st.sampled_from([(), ("spacing",), ("noise",), ("spacing", "noise")])
 listed_fits = st.builds(replace, fits, nominal=matches)
 
 
@@ -62,7 +63,7 @@ def extractions(draw):
         labels=np.full(len(points), -1, np.int32),
         residuals=np.full(len(points), np.nan, np.float32),
         cloud=PointCloud(points, source=source),
-        scene=Scene(draw(positive), draw(positive), draw(positive)),
+        scene=Scene(draw(positive), draw(positive), draw(positive), draw(givens)),
         stages=(StageReport("slicing", draw(st.integers(0, 99)), 0, {"too few points": np.int64(3)}),),
         config=Config(),
         warnings=tuple(draw(st.lists(st.text(), max_size=2))),

@@ -5,9 +5,10 @@ the same cloud, priors on radius and direction, extents, labels and outputs; the
 """
 
 from cylx.baselines.jin import find_by_spheres
+from cylx.baselines.limits import Limits
 from cylx.baselines.line_fit import fit_line_of_centres
 from cylx.baselines.msac import find_by_consensus
 from cylx.baselines.proposal import Proposal
 from cylx.baselines.tran import find_by_growing
 
-__all__ = ["Proposal", "find_by_consensus", "find_by_growing", "find_by_spheres", "fit_line_of_centres"]
+__all__ = ["Limits", "Proposal", "find_by_consensus", "find_by_growing", "find_by_spheres", "fit_line_of_centres"]

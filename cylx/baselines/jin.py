@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.baselines.limits import Limits
 from cylx.baselines.proposal import Proposal
 from cylx.config import JinConfig
 from cylx.geometry.cells import Cells
@@ -43,8 +44,7 @@ NEAR = 1.5
 
 def find_by_spheres(
     frame: Frame,
-    radii: tuple[float, float],
-    axis: tuple[FloatArray, float] | None,
+    limits: Limits,
     config: JinConfig,
     *,
     seed: int,
@@ -55,10 +55,7 @@ def find_by_spheres(
     Parameters
     ----------
     frame : Frame
-    radii : tuple of float
-        Least and greatest radius, frame units.
-    axis : tuple of ndarray of shape (3,) and float, or None
-        Unit direction of the axes looked for, and the greatest angle to it, radians.
+    limits : Limits
     config : JinConfig
         Resolved.
     seed : int
@@ -69,12 +66,12 @@ def find_by_spheres(
     ------
     Proposal
     """
-    spheres = _find_spheres(frame, radii, config, seed, threads)
+    spheres = _find_spheres(frame, limits.radii, config, seed, threads)
     spheres = spheres[_straight(spheres, config.min_linearity)]
     rng = np.random.default_rng([seed, 13])
     while len(spheres) >= config.min_spheres:
         pairs = rng.integers(len(spheres), size=(config.line_iterations, 2))
-        member = _best_line(spheres, pairs, config.line_distance, axis)
+        member = _best_line(spheres, pairs, config.line_distance, limits)
         if int(member.sum()) < config.min_spheres:
             return
         own = spheres[member]
@@ -169,16 +166,14 @@ def _straight(spheres: FloatArray, linearity: float) -> MaskArray:
     return straight
 
 
-def _best_line(
-    spheres: FloatArray, pairs: IndexArray, distance: float, axis: tuple[FloatArray, float] | None
-) -> MaskArray:
+def _best_line(spheres: FloatArray, pairs: IndexArray, distance: float, limits: Limits) -> MaskArray:
     """Give the spheres that the best supported line through two centres goes through."""
     best = np.zeros(len(spheres), np.bool_)
     for i, j in pairs:
         line = spheres[j, :3] - spheres[i, :3]
         length = float(np.linalg.norm(line))
         radius = 0.5 * (spheres[i, 3] + spheres[j, 3])
-        if length < radius or (axis and abs(line @ axis[0]) < math.cos(axis[1]) * length):
+        if length < radius or not limits.admit(line / length):
             continue
         offsets = spheres[:, :3] - spheres[i, :3]
         along = offsets @ (line / length)

@@ -20,6 +20,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.baselines.limits import Limits
 from cylx.baselines.normals import normals_for
 from cylx.baselines.proposal import Proposal
 from cylx.config import MsacConfig
@@ -40,8 +41,7 @@ WIDE = 1e6
 
 def find_by_consensus(
     frame: Frame,
-    radii: tuple[float, float],
-    axis: tuple[FloatArray, float] | None,
+    limits: Limits,
     config: MsacConfig,
     *,
     seed: int,
@@ -52,10 +52,7 @@ def find_by_consensus(
     Parameters
     ----------
     frame : Frame
-    radii : tuple of float
-        Least and greatest radius, frame units.
-    axis : tuple of ndarray of shape (3,) and float, or None
-        Unit direction of the axes looked for, and the greatest angle to it, radians.
+    limits : Limits
     config : MsacConfig
         Resolved.
     seed : int
@@ -77,11 +74,10 @@ def find_by_consensus(
     points = frame.points[order]
     normals = normals_for("msac", frame.points, config.neighbours)[order]
     distance = (config.distance or 0.0) / frame.spacing
-    limits = np.array([*radii, *(axis[0] if axis else np.zeros(3)), math.cos(axis[1]) if axis else -1.0])
     least = max(6, math.ceil(config.min_share * len(points)))
     while len(points) >= least:
         pairs = rng.integers(len(points), size=(config.iterations, 2))
-        model = _best_of(points, normals, pairs, distance, limits, threads)
+        model = _best_of(points, normals, pairs, distance, limits.numbers, threads)
         if model is None:
             return
         _, distances, _ = cylinder_coordinates(points, model[:3], model[3:6])

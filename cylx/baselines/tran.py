@@ -24,13 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from cylx.baselines.limits import Limits
 from cylx.baselines.normals import normals_for
 from cylx.baselines.proposal import Proposal
 from cylx.config import TranConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.circle import fit_circle
 from cylx.geometry.cylinder import axis_frame, canonical_direction, cylinder_coordinates
-from cylx.geometry.lines import are_along
 from cylx.measures import covered_angle
 from cylx.records import Frame
 
@@ -64,8 +64,7 @@ class Grown(NamedTuple):
 
 def find_by_growing(
     frame: Frame,
-    radii: tuple[float, float],
-    axis: tuple[FloatArray, float] | None,
+    limits: Limits,
     config: TranConfig,
     *,
     seed: int,
@@ -76,10 +75,7 @@ def find_by_growing(
     Parameters
     ----------
     frame : Frame
-    radii : tuple of float
-        Least and greatest radius, frame units.
-    axis : tuple of ndarray of shape (3,) and float, or None
-        Unit direction of the axes looked for, and the greatest angle to it, radians.
+    limits : Limits
     config : TranConfig
         Resolved.
     seed : int
@@ -96,13 +92,12 @@ def find_by_growing(
         If open3d cannot be imported.
     """
     rng = np.random.default_rng([seed, 15])
-    garden = _Garden(frame, normals_for("tran", frame.points, config.neighbours), radii, config)
+    garden = _Garden(frame, normals_for("tran", frame.points, config.neighbours), limits.radii, config)
     drawn = rng.permutation(len(frame.points))[: DRAWN * config.seeds]
     starts = garden.curved_starts(drawn)[: config.seeds]
     with ThreadPoolExecutor(threads) as pool:
         grown = [one for one in pool.map(garden.grow, starts) if one is not None]
-    if axis:
-        grown = [one for one in grown if are_along(one.model[None, 3:6], axis[0], axis[1])[0]]
+    grown = [one for one in grown if limits.admit(one.model[3:6])]
     modes = shift_to_modes(
         np.array([one.model for one in grown]).reshape(-1, 7), math.radians(config.bandwidth_deg), config.bandwidth
     )

@@ -48,7 +48,7 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
             return None
         same = is_of_settings(result, settings) and result.input.is_of(selection)
         same = same and all(Path(name).is_file() for name in job.written(len(result.cylinders)))
-        same = same and result.input.sha256 == sha256_of(job.scan)
+        same = same and _belong(job, result) and result.input.sha256 == sha256_of(job.scan)
     except InputError:
         return None
     return result if same else None
@@ -57,8 +57,8 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
 def is_of_settings(result: Result, settings: Config) -> bool:
     """Say whether settings amount to the configuration of a result.
 
-    What is read off the cloud follows from its spacing, its noise and its bounds, which the result has. Whether spacing
-    and noise were measured, or given, it does not say: if the settings leave them open, either will do.
+    What is read off the cloud follows from its spacing, its noise and its bounds, which the result has. It also says
+    which of the first two were given: those must be given again, and the others left to be measured.
 
     Parameters
     ----------
@@ -71,9 +71,28 @@ def is_of_settings(result: Result, settings: Config) -> bool:
     from cylx.scene import resolve
 
     bounds, known = result.input.bounds, settings.scene
+    if known.given != tuple(result.scene.given or ()):
+        return False
     extent = float(np.linalg.norm(np.subtract(bounds.max, bounds.min)))
     scene = Scene(known.spacing or result.scene.spacing, known.noise or result.scene.noise, extent)
     return resolve(settings, scene).model_dump(mode="json") == result.config
+
+
+def _belong(job: Job, result: Result) -> bool:
+    """Say whether what can be told to be of another result, or another unit, is of this one."""
+    from cylx.cli.meshes import mesh_of
+    from cylx.io import read_json
+
+    if job.rejected is not None:
+        rejected = read_json(job.rejected)
+        content = result.to_object()
+        if any(rejected.get(key) != content[key] for key in ("cylx_version", "input", "config")):
+            return False
+    if job.mesh is None:
+        return True
+    mesh, _ = mesh_of(job.mesh, result.cylinders, job.units)
+    file = Path(job.mesh)
+    return (file.read_bytes() if file.is_file() else None) == mesh
 
 
 def check_own(jobs: Sequence[Job]) -> None:

@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cylx.errors import UsageError
 from cylx.experiments.figures import Figure
 from cylx.experiments.study import QUANTITIES, Summary
 from cylx.experiments.table import Trials
+from cylx.matplotlib_door import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+DPI = 110
 LABELS = {
     "angle_deg": "axis angle, °",
     "offset": "axis offset, radii",
@@ -46,15 +47,9 @@ def draw(figure: Figure, summaries: list[Summary], trials: Trials) -> bytes:
     UsageError
         If matplotlib is not installed.
     """
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415  an extra
-        from matplotlib.figure import Figure as Canvas  # noqa: PLC0415  an extra
-    except ImportError:
-        raise UsageError("the pictures", "matplotlib is not installed", "pip install 'cylx[plots]'") from None
     rows = [quantity for quantity in QUANTITIES if quantity in _shown(figure)]
     panels = figure.panels
-    canvas = Canvas(figsize=(5.2 * len(panels) + 1.8, 2.7 * len(rows) + 0.8), layout="constrained")
-    FigureCanvasAgg(canvas)
+    canvas = new_figure((5.2 * len(panels) + 1.8, 2.7 * len(rows) + 0.8), DPI, layout="constrained")
     grid = canvas.subplots(len(rows), len(panels), squeeze=False, sharex="col")
     for i, quantity in enumerate(rows):
         for j, panel in enumerate(panels):
@@ -75,7 +70,7 @@ def draw(figure: Figure, summaries: list[Summary], trials: Trials) -> bytes:
     canvas.legend(handles.values(), handles.keys(), loc="outside right upper", fontsize=9)
     canvas.suptitle(f"Figure {figure.number}: {figure.title}", fontsize=11)
     picture = io.BytesIO()
-    canvas.savefig(picture, format="png", dpi=110)
+    canvas.savefig(picture, format="png")
     return picture.getvalue()
 
 

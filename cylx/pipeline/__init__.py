@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
@@ -62,6 +63,7 @@ def extract_cylinders(
         return extract_by_competitor(cloud, config, threads, journal)
     with journal.stage("scene"):
         frame, scene = make_frame(cloud.points, config)
+        scene = replace(scene, given=config.scene.given)
         config = resolve(config, scene)
         radii = radius_range(config, frame)
     with journal.stage("curvature"):

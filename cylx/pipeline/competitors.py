@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 
-from cylx.baselines import Proposal, find_by_consensus, find_by_growing, find_by_spheres, fit_line_of_centres
+from cylx.baselines import Limits, Proposal, find_by_consensus, find_by_growing, find_by_spheres, fit_line_of_centres
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.measures import covered_angle
@@ -46,6 +47,7 @@ def extract_by_competitor(cloud: PointCloud, config: Config, threads: int, journ
     """
     with journal.stage("scene"):
         frame, scene = make_frame(cloud.points, config)
+        scene = replace(scene, given=config.scene.given)
         config = resolve(config, scene)
         radii = radius_range(config, frame)
         ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), frame.noise)
@@ -74,15 +76,15 @@ def _proposals(
     if config.method == "line-fit":
         fits = ellipses_of_slices(frame, np.zeros(len(frame.points)), radii, config, threads, journal)
         return fit_line_of_centres(fits, frame, config.line_fit)
-    axis = None
+    limits = Limits(radii)
     if config.scene.axis is not None:
         along = np.array(config.scene.axis, dtype=np.float64)
-        axis = along / np.linalg.norm(along), math.radians(config.scene.axis_tolerance_deg)
+        limits = Limits(radii, along / np.linalg.norm(along), math.radians(config.scene.axis_tolerance_deg))
     if config.method == "msac":
-        return find_by_consensus(frame, radii, axis, config.msac, seed=config.seed, threads=threads)
+        return find_by_consensus(frame, limits, config.msac, seed=config.seed, threads=threads)
     if config.method == "tran":
-        return find_by_growing(frame, radii, axis, config.tran, seed=config.seed, threads=threads)
-    return find_by_spheres(frame, radii, axis, config.jin, seed=config.seed, threads=threads)
+        return find_by_growing(frame, limits, config.tran, seed=config.seed, threads=threads)
+    return find_by_spheres(frame, limits, config.jin, seed=config.seed, threads=threads)
 
 
 def _with_extent(proposal: Proposal, ground: Ground, radii: tuple[float, float], config: Config) -> Finding | Refusal:

@@ -109,11 +109,14 @@ class Scene:
         Standard deviation of the points about their surface, scene units.
     extent : float
         Diagonal of the bounding box, scene units.
+    given : tuple of str
+        Which of `spacing` and `noise` the configuration gave; the others were measured.
     """
 
     spacing: float
     noise: float
     extent: float
+    given: tuple[str, ...] = ()
 
 
 SMALL_PATCH = 2.0

@@ -118,7 +118,7 @@ def _glance(result: Result, scenery: Scenery, most_points: int) -> dict[str, Any
         "embedded": True,
         "result": {**content, "cylinders": cylinders},
         "view": view_of(scenery, most_points),
-        "maps": maps_of(scenery, max(64, MOST_CELLS // max(count, 1))) if len(scenery.points) else [],
+        "maps": maps_of(scenery, max(64, MOST_CELLS // max(count, 1))) if (scenery.labels >= 0).any() else [],
     }
 
 

@@ -362,7 +362,18 @@ function tryView() {
     return performance.now() - begun;
   });
   told.milliseconds = Math.min(...times);
+  viewer.last = 0;
+  told.shares = [600, 600, 600, 10, 10].map(shareAfter);
+  Object.assign(viewer, { share: 1, moving: null, last: -Infinity });
   return told;
+}
+
+/** Give the share of the points that is drawn once a frame has taken so long while the view was dragged. */
+function shareAfter(milliseconds) {
+  const now = viewer.last + milliseconds;
+  Object.assign(viewer, { stirred: true, moving: viewer.last + 1, wanted: viewer.last + 1 });
+  viewer.frame(now);
+  return viewer.share;
 }
 
 /** Count the pixels that are not background, right after drawing. */

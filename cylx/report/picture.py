@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.matplotlib_door import new_figure
 from cylx.palette import cylinder_colors
-from cylx.report.figures import new_figure
 from cylx.report.points import choose_points
 from cylx.report.scenery import Scenery
 

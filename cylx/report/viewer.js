@@ -161,6 +161,7 @@ class Viewer {
     this.hidden = new Set();
     this.selected = -1;
     this.share = 1;
+    this.last = -Infinity;
     this.onPick = () => {};
     this.camera = { ...HOME_ANGLES, target: view.home.center, distance: view.home.radius / TANGENT * ROOM };
     this.build();
@@ -268,6 +269,7 @@ class Viewer {
 
   move() {
     this.flight = null;
+    this.stirred = true;
     this.moving = performance.now();
     this.ask();
   }
@@ -300,7 +302,9 @@ class Viewer {
 
   /** Draw soon, once. */
   ask() {
-    this.asked ??= requestAnimationFrame((now) => {
+    if (this.asked) return;
+    this.wanted = performance.now();
+    this.asked = requestAnimationFrame((now) => {
       this.asked = null;
       this.frame(now);
     });
@@ -309,10 +313,12 @@ class Viewer {
   /** Draw; while something moves on a slow machine, only some of the points, and all of them when it rests. */
   frame(now) {
     if (this.flight) this.advance(now);
-    const resting = !this.flight && now - (this.moving ?? 0) > 200;
-    if (!resting && now - this.last < 500) {
-      if (now - this.last > SLOW) this.share = Math.max(1 / 16, this.share / 2);
-      else if (now - this.last < SLOW / 3) this.share = Math.min(1, this.share * 1.2);
+    const resting = !this.flight && !this.stirred && now - (this.moving ?? 0) > 200; // a frame may take longer than that
+    this.stirred = false;
+    const took = now - this.last;
+    if (!resting && this.wanted - this.last < 200) { // otherwise nothing was to be drawn since
+      if (took > SLOW) this.share = Math.max(1 / 16, this.share * Math.min(1 / 2, SLOW / took));
+      else if (took < SLOW / 3) this.share = Math.min(1, this.share * 1.2);
     }
     this.last = now;
     this.draw(resting ? 1 : this.share);
