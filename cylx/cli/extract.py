@@ -178,9 +178,10 @@ class Run:
             If the outputs cannot be written.
         """
         from cylx.cli.display import Observers, observed
-        from cylx.cli.kernels import import_numba_without_blas
+        from cylx.cli.kernels import collect_rarely, import_numba_without_blas
         from cylx.cli.outcomes import Finished
 
+        collect_rarely()
         import_numba_without_blas()
         from cylx.io import read_cloud
         from cylx.pipeline import extract_cylinders

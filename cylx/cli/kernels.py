@@ -1,7 +1,8 @@
-"""Numba made ready without what no kernel here needs."""
+"""A quick start: Numba without what no kernel here needs, and garbage collected when there is some."""
 
 from __future__ import annotations
 
+import gc
 import sys
 from importlib import import_module
 
@@ -21,3 +22,11 @@ def import_numba_without_blas() -> None:
         import_module("numba.np.arraymath")
     finally:
         del sys.modules[BLAS]
+
+
+def collect_rarely() -> None:
+    """Let the garbage collector wait: imports make half a million objects, which all stay, and it looks at each often.
+
+    Arrays are freed without it, when the last that holds them lets go.
+    """
+    gc.set_threshold(100_000, 50, 100)

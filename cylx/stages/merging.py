@@ -77,8 +77,14 @@ def _first_join(pool: list[Finding], i: int, ground: Ground, judge: Judge) -> tu
     ratios = others[:, 6] / one[6]
     alike = np.abs(others[:, 3:6] @ one[3:6]) >= COSINE
     alike &= (ratios >= RADIUS_RATIO) & (ratios * RADIUS_RATIO <= 1.0)
+    across = others[:, :3] - one[:3]
+    heights = across @ one[3:6]
+    apart = np.linalg.norm(across - heights[:, None] * one[3:6], axis=1)
+    offsets = np.array([finding.offset_error for finding in rest])
+    errors = np.sqrt(pool[i].offset_error ** 2 + offsets**2 + (pool[i].tilt_error * heights) ** 2)
+    alike &= apart <= OFFSET * one[6] + 4.0 * errors
     for k in np.flatnonzero(alike):
-        joined = _join(pool[i], rest[k], ground, judge)
+        joined = _join(pool[i], rest[k], float(errors[k]), ground, judge)
         if joined is not None:
             return i + 1 + int(k), joined
     return None
@@ -149,15 +155,11 @@ def _is_bridged(ground: Ground, model: FloatArray, half: float, width: float) ->
     return bool(on.sum() >= BETWEEN and on.sum() > DENSER * about)
 
 
-def _join(a: Finding, b: Finding, ground: Ground, judge: Judge) -> Finding | None:
-    """Fit one cylinder to two pieces alike in direction and radius; None if it does not explain both."""
+def _join(a: Finding, b: Finding, error: float, ground: Ground, judge: Judge) -> Finding | None:
+    """Fit one cylinder to two pieces alike and in line within an error; None if it does not explain both."""
     one, two = a.segment, b.segment
     across = two.model[:3] - one.model[:3]
     height = float(across @ one.model[3:6])
-    apart = float(np.linalg.norm(across - height * one.model[3:6]))
-    error = math.sqrt(a.offset_error**2 + b.offset_error**2 + (a.tilt_error * height) ** 2)
-    if apart > OFFSET * one.model[6] + 4.0 * error:
-        return None
     gap, model = abs(height) - one.half - two.half, one.model.copy()
     lost = error > LOST * one.model[6]
     if gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]:
