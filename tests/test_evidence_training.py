@@ -418,7 +418,7 @@ def synthetic_line(rng, index):
     true = bool(rng.random() < 0.4)
     measures |= {"height_radii": float(5 * rng.random()), "agreement": float(0.4 * true + 0.5 * rng.random())}
     measures |= {"curvature": 9.0, "windows": 5.0, "places": 12.0, "coverage": 3.0, "inliers": 300.0, "payoff": 0.7}
-    measures |= {"lack_of_fit": float(1.0 + rng.random()), "bend_error": 0.01}
+    measures |= {"lack_of_fit": float(1.0 + rng.random()), "bend_error": 0.01, "radius_noises": 9.0}
     return {
         "scene": f"s{index % 20}",
         "label": labels.TRUE if true else labels.FALSE,
