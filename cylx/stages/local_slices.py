@@ -159,8 +159,7 @@ def _slice_windows(
 ) -> None:
     found, around, alone = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
     flat, samples = np.empty((CAPACITY, 2)), np.empty((SAMPLES, 5), np.int64)
-    model, normal, frame = np.empty(7), np.empty(3), np.empty((2, 3))
-    shape, quality = np.empty(5), np.empty(3)
+    model, normal, frame, shape, quality = np.empty(7), np.empty(3), np.empty((2, 3)), np.empty(5), np.empty(3)
     for s in range(len(seeds)):
         seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1
         for _ in range(4):
