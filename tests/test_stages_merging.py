@@ -169,3 +169,9 @@ def test_far_pieces_are_joined_if_there_are_points_between_them():
     assert len(far_pieces(np.empty((0, 3)))) == 2
     beside = rng.uniform([-1.5, -1.5, 3.0], [1.5, 1.5, 400.0], (400, 3))
     assert len(far_pieces(beside)) == 2
+
+
+def test_pieces_side_by_side_are_joined_however_uncertain_their_direction():
+    ground, findings, _ = world(pipe(0.0, 2.0), pipe(2.5, 4.5))
+    findings = [replace(one, tilt_error=2.0) for one in findings]
+    assert len(merge_pieces(findings, ground, accept(ground))) == 1

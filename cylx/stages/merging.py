@@ -161,8 +161,8 @@ def _join(a: Finding, b: Finding, error: float, ground: Ground, judge: Judge) ->
     across = two.model[:3] - one.model[:3]
     height = float(across @ one.model[3:6])
     gap, model = abs(height) - one.half - two.half, one.model.copy()
-    lost = error > LOST * one.model[6]
-    if gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]:
+    far = gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]
+    if far:
         if error > FARTHEST * one.model[6] or not _point_at_each_other(a, b):
             return None
         model[3:6] = across * math.copysign(1.0 / float(np.linalg.norm(across)), height)
@@ -186,6 +186,7 @@ def _join(a: Finding, b: Finding, error: float, ground: Ground, judge: Judge) ->
         distances = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))
         if (np.abs(distances - model[6]) < width).mean() < share:
             return None
+    lost = far and error > LOST * one.model[6]
     if lost and not _is_bridged(ground, model, 0.5 * gap - abs(one.half - two.half), 0.5 * width):
         return None
     return judge(Segment(model, half, spread), a if a.payoff >= b.payoff else b)
