@@ -49,9 +49,9 @@ def _deviation(rng):
     return float(np.exp(rng.uniform(np.log(0.5 * CLEARLY), np.log(0.3))))
 
 
-def _put(rng, sketch, space, heights, radii, deviation, oval=0.0):
+def _put(rng, sketch, space, radius, heights, radii, deviation, oval=0.0):
     """Put a profile turned about an axis somewhere; it is no cylinder if it deviates clearly."""
-    radius, height = float(np.mean(radii)), float(heights[-1])
+    height = float(heights[-1])
     center = space.place(rng, float(np.hypot(0.5 * height, 1.3 * radius)))
     if center is None:
         return
@@ -68,7 +68,7 @@ def barrel(rng, sketch, space):
     radius, height = _sized(rng, space)
     deviation, heights = _deviation(rng), np.linspace(0.0, height, 40)
     shares = deviation * rng.choice([-1.0, 1.0]) * ((2.0 * heights / height - 1.0) ** 2 - 1 / 3)
-    _put(rng, sketch, space, heights, radius * (1.0 + shares), deviation)
+    _put(rng, sketch, space, radius, heights, radius * (1.0 + shares), deviation)
 
 
 def tapered(rng, sketch, space):
@@ -76,14 +76,14 @@ def tapered(rng, sketch, space):
     radius, height = _sized(rng, space)
     slope = rng.choice([-1.0, 1.0]) * np.exp(rng.uniform(np.log(0.03), np.log(0.4)))
     radii = np.maximum(radius + slope * height * np.array([-0.5, 0.5]), 0.05 * radius)
-    _put(rng, sketch, space, np.array([0.0, height]), radii, CLEARLY if abs(slope) > 0.052 else 0.0)
+    _put(rng, sketch, space, radius, np.array([0.0, height]), radii, CLEARLY if abs(slope) > 0.052 else 0.0)
 
 
 def oval(rng, sketch, space):
     """Add a straight tube of oval section: twice as oval as need be, for the half that is seen may look round."""
     radius, height = _sized(rng, space)
     deviation = _deviation(rng)
-    _put(rng, sketch, space, np.array([0.0, height]), np.full(2, radius), 0.5 * deviation, oval=deviation)
+    _put(rng, sketch, space, radius, np.array([0.0, height]), np.full(2, radius), 0.5 * deviation, oval=deviation)
 
 
 def bent(rng, sketch, space):
