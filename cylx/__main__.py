@@ -1,6 +1,14 @@
-"""`python -m cylx`."""
+"""`python -m cylx`, and what the command `cylx` calls."""
 
 from cylx.cli import main
+from cylx.cli.kernels import own_process
+
+
+def run() -> None:
+    """Run the command line in a process of its own."""
+    with own_process():
+        main(prog_name="cylx")
+
 
 if __name__ == "__main__":
-    main(prog_name="cylx")
+    run()

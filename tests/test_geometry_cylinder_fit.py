@@ -211,7 +211,7 @@ def test_points_on_one_ring_are_fitted_across_it_or_not_at_all():
 
 def quality_of(points, model, width):
     quality = np.empty(2)
-    candidate_quality(points, len(points), model, width, np.empty((2, 3)), quality)
+    candidate_quality(np.ascontiguousarray(points.T), len(points), model, width, np.empty((2, 3)), quality)
     return quality
 
 
@@ -242,7 +242,7 @@ LIMITS = 0.1, 10.0, 15, 0.25, 0.5
 def polished(points, start, noise, limits=LIMITS):
     """Polish a copy of a rough cylinder; give what it is said to be, the model and its quality."""
     model, quality = start.copy(), np.full(3, np.nan)
-    return polish(np.ascontiguousarray(points), len(points), model, noise, *limits, quality), model, quality
+    return polish(np.ascontiguousarray(points.T), len(points), model, noise, *limits, quality), model, quality
 
 
 @laws

@@ -130,7 +130,7 @@ def rod(rng, n, length, sigma):
 def fitted(points, reach=np.inf):
     """Fit a line; give the distances from it over those along it, and its direction."""
     place, direction = np.zeros(3), np.full(3, np.nan)
-    across, along = fit_line(np.ascontiguousarray(points), len(points), reach, place, direction)
+    across, along = fit_line(np.ascontiguousarray(points.T), len(points), reach, place, direction)
     return across / along, direction
 
 
@@ -209,23 +209,23 @@ def test_the_place_is_on_the_line_and_the_distances_are_root_mean_squares(seed):
     rng = np.random.default_rng(seed)
     points, true, along = rod(rng, 400, 4.0, 0.02)
     place, direction = np.zeros(3), np.empty(3)
-    across, length = fit_line(points, 400, np.inf, place, direction)
+    across, length = fit_line(np.ascontiguousarray(points.T), 400, np.inf, place, direction)
     middle = points.mean(axis=0)
     assert np.linalg.norm(np.cross(place - middle, true)) < 0.01
     assert np.isclose(length, along.std(), rtol=0.1)
     assert np.isclose(across, np.sqrt(2) * 0.02, rtol=0.2)
     assert np.allclose(
-        [off_line(points, i, place, direction) for i in range(9)],
+        [off_line(np.ascontiguousarray(points.T), i, place, direction) for i in range(9)],
         np.linalg.norm(np.cross(points[:9] - place, direction), axis=1),
     )
 
 
 def test_only_the_first_points_count_and_of_a_few_there_is_no_line():
     rng = np.random.default_rng(0)
-    points, _, _ = rod(rng, 60, 2.0, 0.01)
+    xyz = np.ascontiguousarray(rod(rng, 60, 2.0, 0.01)[0].T)
     for n in range(LEAST):
-        assert fit_line(points, n, np.inf, np.zeros(3), np.empty(3)) == (np.inf, 1.0)
+        assert fit_line(xyz, n, np.inf, np.zeros(3), np.empty(3)) == (np.inf, 1.0)
     one, other = (np.zeros(3), np.empty(3)), (np.zeros(3), np.empty(3))
-    assert fit_line(points, 40, np.inf, *one) == fit_line(points[:40].copy(), 40, np.inf, *other)
+    assert fit_line(xyz, 40, np.inf, *one) == fit_line(xyz[:, :40].copy(), 40, np.inf, *other)
     assert np.array_equal(one, other)
-    assert fit_line(points, 40, np.inf, *one)[0] < 0.1
+    assert fit_line(xyz, 40, np.inf, *one)[0] < 0.1

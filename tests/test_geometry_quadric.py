@@ -16,15 +16,18 @@ TINY = 1e-9  # a noise for clouds that have none
 def plane_of(points, noise=TINY):
     """Give share, centre and normal."""
     center, normal = np.full(3, np.nan), np.full(3, np.nan)
-    share = fit_plane(points, len(points), noise, center, normal, np.empty((3, 3)), np.empty((3, 3)))
+    share = fit_plane(
+        np.ascontiguousarray(points.T), len(points), noise, center, normal, np.empty((3, 3)), np.empty((3, 3))
+    )
     return share, center, normal
 
 
 def cylinder_of(points, center, normal, noise=TINY):
     """Give the osculating cylinder (7,), or None where there is no curvature."""
     model = np.full(7, np.nan)
-    scratch = np.empty((6, 6)), np.empty(6), np.empty((2, 3)), np.empty((len(points), 4))
-    return model if osculating_cylinder(points, len(points), noise, center, normal, model, *scratch) else None
+    scratch = np.empty((6, 6)), np.empty(6), np.empty((2, 3)), np.empty((4, len(points)))
+    xyz = np.ascontiguousarray(points.T)
+    return model if osculating_cylinder(xyz, len(points), noise, center, normal, model, *scratch) else None
 
 
 def window(rng, size, n=300, radius=1.0):

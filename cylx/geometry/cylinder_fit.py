@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.simd import FINITE, REORDERED
 from cylx.geometry.small_matrices import fill_frame, solve_in_place
 
 FloatArray = NDArray[np.float64]
@@ -57,9 +58,9 @@ class Kernel(NamedTuple):
     tolerance: float = 1e-9
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
 def _accumulate(
-    points: FloatArray,
+    xyz: FloatArray,
     n: int,
     model: FloatArray,
     low: float,
@@ -69,32 +70,29 @@ def _accumulate(
     right: FloatArray,
     frame: FloatArray,
     sums: FloatArray,
-    stride: int,
 ) -> None:
-    """Fill the weighted normal equations of a step from every so manyth point.
-
-    `sums` gets the weights, the squares and the largest height.
-    """
+    """Fill the weighted normal equations of a step; `sums` gets the weights, and the squares of residuals."""
     fill_frame(model[3:6], frame)
-    weights, squares, reach = 0.0, 0.0, 0.0
+    px, py, pz, radius = model[0], model[1], model[2], model[6]
+    ux, uy, uz = model[3], model[4], model[5]
+    fx, fy, fz = frame[0, 0], frame[0, 1], frame[0, 2]
+    gx, gy, gz = frame[1, 0], frame[1, 1], frame[1, 2]
+    weights, squares = 0.0, 0.0
     # with (cos, sin, z cos, z sin, 1) as the row of a point, sums of products are shared; scalars stay in registers
     c, s, cc, cs, ss = 0.0, 0.0, 0.0, 0.0, 0.0
     zc, zs, zcc, zcs, zss = 0.0, 0.0, 0.0, 0.0, 0.0
     zzcc, zzcs, zzss = 0.0, 0.0, 0.0
     rc, rs, rzc, rzs, r = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(0, n, stride):
-        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
-        z = dx * model[3] + dy * model[4] + dz * model[5]
-        if z < low or z > high:
-            continue
-        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+    for i in range(n):
+        dx, dy, dz = xyz[0, i] - px, xyz[1, i] - py, xyz[2, i] - pz
+        z = dx * ux + dy * uy + dz * uz
+        x = dx * fx + dy * fy + dz * fz
+        y = dx * gx + dy * gy + dz * gz
         distance = math.sqrt(x * x + y * y) + 1e-300
-        residual = distance - model[6]
+        residual = distance - radius
         ratio = residual / width
-        if abs(ratio) >= 1.0:
-            continue
-        weight = (1.0 - ratio * ratio) ** 2
+        rest = 1.0 - ratio * ratio
+        weight = rest * rest if rest > 0.0 and low <= z <= high else 0.0
         cosine, sine = x / distance, y / distance
         wc, ws, wr = weight * cosine, weight * sine, weight * residual
         wcc, wcs, wss = wc * cosine, wc * sine, ws * sine
@@ -105,7 +103,6 @@ def _accumulate(
         rzc, rzs = rzc + z * wr * cosine, rzs + z * wr * sine
         weights += weight
         squares += weight * residual * residual
-        reach = max(reach, abs(z))
     normal[0, 0], normal[0, 1], normal[0, 2], normal[0, 3], normal[0, 4] = cc, cs, zcc, zcs, c
     normal[1, 1], normal[1, 2], normal[1, 3], normal[1, 4] = ss, zcs, zss, s
     normal[2, 2], normal[2, 3], normal[2, 4] = zzcc, zzcs, zc
@@ -115,7 +112,7 @@ def _accumulate(
         normal[a, a] *= 1.0 + 1e-9
         for b in range(a):
             normal[a, b] = normal[b, a]
-    sums[0], sums[1], sums[2] = weights, squares, reach
+    sums[0], sums[1] = weights, squares
 
 
 @njit(cache=True, nogil=True)
@@ -138,7 +135,7 @@ def _advance(model: FloatArray, right: FloatArray, frame: FloatArray, reach: flo
 
 @njit(cache=True, nogil=True)
 def fit_in_place(
-    points: FloatArray,
+    xyz: FloatArray,
     n: int,
     model: FloatArray,
     low: float,
@@ -148,11 +145,10 @@ def fit_in_place(
     right: FloatArray,
     frame: FloatArray,
 ) -> float:
-    """Fit `model` = (point, direction, radius), shape (7,), to points[:n] whose height lies in [low, high].
+    """Fit `model` = (point, direction, radius), shape (7,), to xyz[:, :n] whose height lies in [low, high].
 
-    Heights are measured from the model's point along its direction. `schedule` (7,) has what a `Kernel` has, the
-    most steps, and that every so manyth point takes part. `normal` (5, 5), `right` (5,) and `frame` (2, 3)
-    are scratch.
+    Heights are measured from the model's point along its direction. `schedule` (6,) has what a `Kernel` has, and the
+    most steps. `normal` (5, 5), `right` (5,) and `frame` (2, 3) are scratch.
 
     Returns
     -------
@@ -161,14 +157,15 @@ def fit_in_place(
     """
     width, floor, decay, tuning, tolerance = schedule[0], schedule[1], schedule[2], schedule[3], schedule[4]
     spread = width / 3.0
-    sums = np.empty(3)
-    stride = int(schedule[6])
+    sums = np.empty(2)
     for _ in range(int(schedule[5])):
-        _accumulate(points, n, model, low, high, width, normal, right, frame, sums, stride)
+        _accumulate(xyz, n, model, low, high, width, normal, right, frame, sums)
+        # of heights spread evenly the greatest is sqrt(3) times the root mean square
+        reach = math.sqrt(3.0 * max(normal[2, 2] + normal[3, 3], 0.0) / max(sums[0], 1.0))
         if sums[0] < 8.0 or not solve_in_place(normal, right):
             return -1.0
         spread = math.sqrt(sums[1] / sums[0])
-        size = _advance(model, right, frame, sums[2])
+        size = _advance(model, right, frame, reach)
         if not (0.0 < model[6] < 1e12):
             return -1.0
         last = width
@@ -206,8 +203,8 @@ def fit_cylinder(
     """
     fitted = np.array(model, dtype=np.float64)
     scratch = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    schedule = np.array([*kernel, steps, 1.0], dtype=np.float64)
-    spread = fit_in_place(np.ascontiguousarray(points), len(points), fitted, low, high, schedule, *scratch)
+    schedule = np.array([*kernel, steps], dtype=np.float64)
+    spread = fit_in_place(np.ascontiguousarray(points.T), len(points), fitted, low, high, schedule, *scratch)
     return None if spread < 0 else (fitted, float(spread))
 
 
@@ -216,30 +213,34 @@ def unbiased_radius(radius: float, spread: float) -> float:
     return radius - spread * spread / (2.0 * radius)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=FINITE)
 def candidate_quality(
-    points: FloatArray, n: int, model: FloatArray, width: float, frame: FloatArray, quality: FloatArray
+    xyz: FloatArray, n: int, model: FloatArray, width: float, frame: FloatArray, quality: FloatArray
 ) -> None:
-    """Fill the first two of `quality` with what supports a cylinder among points[:n].
+    """Fill the first two of `quality` with what supports a cylinder among xyz[:, :n].
 
     The inliers (within `width` of the surface), and the extent of their heights.
     """
     fill_frame(model[3:6], frame)
-    lowest, highest, count = math.inf, -math.inf, 0
+    px, py, pz, radius = model[0], model[1], model[2], model[6]
+    ux, uy, uz = model[3], model[4], model[5]
+    fx, fy, fz = frame[0, 0], frame[0, 1], frame[0, 2]
+    gx, gy, gz = frame[1, 0], frame[1, 1], frame[1, 2]
+    lowest, highest, count = 1e300, -1e300, 0.0
     for i in range(n):
-        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
-        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-        if abs(math.sqrt(x * x + y * y) - model[6]) < width:
-            z = dx * model[3] + dy * model[4] + dz * model[5]
-            lowest, highest = min(lowest, z), max(highest, z)
-            count += 1
-    quality[0], quality[1] = count, highest - lowest if count else 0.0
+        dx, dy, dz = xyz[0, i] - px, xyz[1, i] - py, xyz[2, i] - pz
+        x = dx * fx + dy * fy + dz * fz
+        y = dx * gx + dy * gy + dz * gz
+        z = dx * ux + dy * uy + dz * uz
+        on = abs(math.sqrt(x * x + y * y) - radius) < width
+        lowest, highest = min(lowest, z if on else 1e300), max(highest, z if on else -1e300)
+        count += 1.0 if on else 0.0
+    quality[0], quality[1] = count, highest - lowest if count > 0.0 else 0.0
 
 
 @njit(cache=True, nogil=True)
 def polish(
-    points: FloatArray,
+    xyz: FloatArray,
     n: int,
     model: FloatArray,
     noise: float,
@@ -254,7 +255,7 @@ def polish(
 
     Parameters
     ----------
-    points : ndarray of shape (>= n, 3)
+    xyz : ndarray of shape (3, >= n)
     n : int
     model : ndarray of shape (7,)
         Changed.
@@ -272,18 +273,25 @@ def polish(
         2 if it does, 1 if it is badly supported, 0 if it does not fit.
     """
     matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    schedule = np.empty(7)
+    schedule = np.empty(6)
     floor = max(3.0 * noise, 0.01 * model[6])
     schedule[0], schedule[1], schedule[2] = max(0.3 * model[6], 4.0 * noise), floor, 0.6
     schedule[3], schedule[4], schedule[5] = math.inf, 1e-2, POLISH_STEPS
-    schedule[6] = max(1, n // SOME)
-    spread = fit_in_place(points, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
-    if schedule[6] > 1 and 0.0 <= spread <= 1.2 * SHARP * floor:  # some of the points brought it near, all decide
-        schedule[0], schedule[5], schedule[6] = floor, LAST_STEPS, 1
-        spread = fit_in_place(points, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
+    stride = max(1, n // SOME)
+    if stride > 1:
+        count = (n + stride - 1) // stride
+        some = np.empty((3, count))
+        for i in range(count):
+            for d in range(3):
+                some[d, i] = xyz[d, i * stride]
+        spread = fit_in_place(some, count, model, -math.inf, math.inf, schedule, matrix, right, frame)
+        if not 0.0 <= spread <= 1.2 * SHARP * floor:
+            return 0
+        schedule[0], schedule[5] = floor, LAST_STEPS  # some of the points brought it near, all decide
+    spread = fit_in_place(xyz, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
     if spread < 0.0 or spread > SHARP * floor or not (least <= model[6] <= greatest):
         return 0
-    candidate_quality(points, n, model, 3.0 * noise, frame, quality)
+    candidate_quality(xyz, n, model, 3.0 * noise, frame, quality)
     quality[2] = spread
     supported = quality[0] >= min_inliers and quality[0] >= min_share * n and quality[1] >= min_extent
     return 2 if supported else 1

@@ -101,8 +101,8 @@ def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> NDAr
 
 
 @njit(cache=True, nogil=True)
-def fit_line(points: FloatArray, n: int, reach: float, place: FloatArray, direction: FloatArray) -> tuple[float, float]:
-    """Fit a line to those of points[:n] within `reach` of zero, trimmed twice; fill `place` and `direction` (3,).
+def fit_line(xyz: FloatArray, n: int, reach: float, place: FloatArray, direction: FloatArray) -> tuple[float, float]:
+    """Fit a line to those of xyz[:, :n] within `reach` of zero, trimmed twice; fill `place` and `direction` (3,).
 
     Returns
     -------
@@ -116,12 +116,12 @@ def fit_line(points: FloatArray, n: int, reach: float, place: FloatArray, direct
     for _ in range(3):
         total[0], total[1], total[2], count = 0.0, 0.0, 0.0, 0
         for i in range(n):
-            square = points[i, 0] ** 2 + points[i, 1] ** 2 + points[i, 2] ** 2
-            chosen[i] = square < reach * reach and off_line(points, i, place, direction) <= width
+            square = xyz[0, i] ** 2 + xyz[1, i] ** 2 + xyz[2, i] ** 2
+            chosen[i] = square < reach * reach and off_line(xyz, i, place, direction) <= width
             if chosen[i]:
                 count += 1
                 for d in range(3):
-                    total[d] += points[i, d]
+                    total[d] += xyz[d, i]
         if count < LEAST:
             return math.inf, 1.0
         for d in range(3):
@@ -132,7 +132,7 @@ def fit_line(points: FloatArray, n: int, reach: float, place: FloatArray, direct
             if chosen[i]:
                 for d in range(3):
                     for e in range(3):
-                        matrix[d, e] += (points[i, d] - place[d]) * (points[i, e] - place[e]) / count
+                        matrix[d, e] += (xyz[d, i] - place[d]) * (xyz[e, i] - place[e]) / count
         symmetric_eigen(matrix, vectors)
         longest = 0
         for d in range(1, 3):
@@ -147,8 +147,8 @@ def fit_line(points: FloatArray, n: int, reach: float, place: FloatArray, direct
 
 
 @njit(cache=True, nogil=True)
-def off_line(points: FloatArray, i: int, mean: FloatArray, direction: FloatArray) -> float:
+def off_line(xyz: FloatArray, i: int, mean: FloatArray, direction: FloatArray) -> float:
     """Give the distance of point i from a line."""
-    dx, dy, dz = points[i, 0] - mean[0], points[i, 1] - mean[1], points[i, 2] - mean[2]
+    dx, dy, dz = xyz[0, i] - mean[0], xyz[1, i] - mean[1], xyz[2, i] - mean[2]
     along = dx * direction[0] + dy * direction[1] + dz * direction[2]
     return math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - along * along))

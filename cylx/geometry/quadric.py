@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.simd import REORDERED
 from cylx.geometry.small_matrices import fill_frame, solve_in_place, symmetric_eigen
 
 FloatArray = NDArray[np.float64]
@@ -20,7 +21,7 @@ FloatArray = NDArray[np.float64]
 
 @njit(cache=True, nogil=True)
 def fit_plane(
-    points: FloatArray,
+    xyz: FloatArray,
     n: int,
     noise: float,
     center: FloatArray,
@@ -28,7 +29,7 @@ def fit_plane(
     matrix: FloatArray,
     vectors: FloatArray,
 ) -> float:
-    """Fit a plane to points[:n] about zero by principal components, trimmed three times.
+    """Fit a plane to xyz[:, :n] about zero by principal components, trimmed three times.
 
     Fills `center` (3,) and `normal` (3,).
 
@@ -38,20 +39,16 @@ def fit_plane(
         Share of the points within three noises, 0 if those that are do not scatter like noise: an arc of a thin pipe is
         flat within three noises, too.
     """
-    width = math.inf
+    width, sums = math.inf, np.empty(10)
+    for d in range(3):
+        center[d], normal[d] = 0.0, 0.0
     for _ in range(4):
-        mx, my, mz, count = 0.0, 0.0, 0.0, 0
-        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(n):
-            if width < math.inf and abs(_height(points, i, center, normal)) >= width:
-                continue
-            x, y, z = points[i, 0], points[i, 1], points[i, 2]
-            mx, my, mz, count = mx + x, my + y, mz + z, count + 1
-            xx, xy, xz = xx + x * x, xy + x * y, xz + x * z
-            yy, yz, zz = yy + y * y, yz + y * z, zz + z * z
-        if count < 10:
+        _fill_plane_sums(xyz, n, width, center, normal, sums)
+        count = sums[0]
+        if count < 10.0:
             return 0.0
-        mx, my, mz = mx / count, my / count, mz / count
+        mx, my, mz = sums[1] / count, sums[2] / count, sums[3] / count
+        xx, xy, xz, yy, yz, zz = sums[4], sums[5], sums[6], sums[7], sums[8], sums[9]
         # the points lie about zero, so that little is lost by taking the means off the sums
         xx, xy, xz = xx - count * mx * mx, xy - count * mx * my, xz - count * mx * mz
         yy, yz, zz = yy - count * my * my, yz - count * my * mz, zz - count * mz * mz
@@ -67,26 +64,47 @@ def fit_plane(
         for d in range(3):
             normal[d] = vectors[d, least]
         width = max(3.0 * noise, 2.0 * math.sqrt(max(matrix[least, least], 0.0) / count))
-    inside, squares = 0, 0.0
-    for i in range(n):
-        height = _height(points, i, center, normal)
-        if abs(height) < 3.0 * noise:
-            inside += 1
-            squares += height * height
-    if inside == 0 or math.sqrt(squares / inside) > noise * (1.2 + 1.5 / math.sqrt(2.0 * inside)):
+    inside, squares = _count_beside(xyz, n, 3.0 * noise, center, normal)
+    if inside == 0.0 or math.sqrt(squares / inside) > noise * (1.2 + 1.5 / math.sqrt(2.0 * inside)):
         return 0.0
     return float(inside / n)
 
 
-@njit(cache=True, nogil=True)
-def _height(points: FloatArray, i: int, center: FloatArray, normal: FloatArray) -> float:
-    dx, dy, dz = points[i, 0] - center[0], points[i, 1] - center[1], points[i, 2] - center[2]
-    return float(dx * normal[0] + dy * normal[1] + dz * normal[2])
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+def _fill_plane_sums(
+    xyz: FloatArray, n: int, width: float, center: FloatArray, normal: FloatArray, sums: FloatArray
+) -> None:
+    """Fill in number, sums, and sums of products (xx, xy, xz, yy, yz, zz) of the points within `width` of a plane."""
+    cx, cy, cz, nx, ny, nz = center[0], center[1], center[2], normal[0], normal[1], normal[2]
+    mx, my, mz, count = 0.0, 0.0, 0.0, 0.0
+    xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(n):
+        x, y, z = xyz[0, i], xyz[1, i], xyz[2, i]
+        one = 1.0 if abs((x - cx) * nx + (y - cy) * ny + (z - cz) * nz) < width else 0.0
+        wx, wy, wz = one * x, one * y, one * z
+        mx, my, mz, count = mx + wx, my + wy, mz + wz, count + one
+        xx, xy, xz = xx + x * wx, xy + x * wy, xz + x * wz
+        yy, yz, zz = yy + y * wy, yz + y * wz, zz + z * wz
+    sums[0], sums[1], sums[2], sums[3] = count, mx, my, mz
+    sums[4], sums[5], sums[6], sums[7], sums[8], sums[9] = xx, xy, xz, yy, yz, zz
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+def _count_beside(xyz: FloatArray, n: int, width: float, center: FloatArray, normal: FloatArray) -> tuple[float, float]:
+    """Give the number of points within `width` of a plane, and the sum of their squared distances."""
+    cx, cy, cz, nx, ny, nz = center[0], center[1], center[2], normal[0], normal[1], normal[2]
+    count, squares = 0.0, 0.0
+    for i in range(n):
+        height = (xyz[0, i] - cx) * nx + (xyz[1, i] - cy) * ny + (xyz[2, i] - cz) * nz
+        one = 1.0 if abs(height) < width else 0.0
+        count += one
+        squares += one * height * height
+    return count, squares
 
 
 @njit(cache=True, nogil=True)
 def osculating_cylinder(
-    points: FloatArray,
+    xyz: FloatArray,
     n: int,
     noise: float,
     center: FloatArray,
@@ -97,13 +115,13 @@ def osculating_cylinder(
     frame: FloatArray,
     local: FloatArray,
 ) -> bool:
-    """Fit a quadric over a plane to points[:n] and fill `model` (7,) with the cylinder that osculates it.
+    """Fit a quadric over a plane to xyz[:, :n] and fill `model` (7,) with the cylinder that osculates it.
 
     Parameters
     ----------
     center, normal : ndarray of shape (3,)
         The plane, from `fit_plane`.
-    gram, terms, frame, local : ndarray of shape (6, 6), (6,), (2, 3), (>= n, 4)
+    gram, terms, frame, local : ndarray of shape (6, 6), (6,), (2, 3), (4, >= n)
         Scratch.
 
     Returns
@@ -113,46 +131,39 @@ def osculating_cylinder(
     """
     fill_frame(normal, frame)
     for i in range(n):
-        dx, dy, dz = points[i, 0] - center[0], points[i, 1] - center[1], points[i, 2] - center[2]
-        local[i, 0] = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        local[i, 1] = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-        local[i, 2] = dx * normal[0] + dy * normal[1] + dz * normal[2]
+        dx, dy, dz = xyz[0, i] - center[0], xyz[1, i] - center[1], xyz[2, i] - center[2]
+        local[0, i] = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
+        local[1, i] = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        local[2, i] = dx * normal[0] + dy * normal[1] + dz * normal[2]
+        local[3, i] = 0.0
     width = math.inf
     for _ in range(4):
-        if _fill_moments(local, n, width, gram, terms) < 10 or not solve_in_place(gram, terms):
+        count = _fill_moments(local, n, width, gram, terms)
+        if count < 10.0 or not solve_in_place(gram, terms):
             return False
-        total, count = 0.0, 0
-        for i in range(n):
-            x, y = local[i, 0], local[i, 1]
-            z = local[i, 2] - terms[0] * x * x - terms[1] * x * y - terms[2] * y * y
-            z -= terms[3] * x + terms[4] * y + terms[5]
-            if width == math.inf or abs(local[i, 3]) <= width:
-                total += abs(z)
-                count += 1
-            local[i, 3] = z
-        width = max(2.5 * noise, 2.5 * total / count)  # two standard deviations, from the mean deviation
+        # two standard deviations, from the mean deviation
+        width = max(2.5 * noise, 2.5 * _fill_residuals(local, n, width, terms) / count)
     return _fill_model(terms, center, normal, frame, model)
 
 
-@njit(cache=True, nogil=True)
-def _fill_moments(local: FloatArray, n: int, width: float, gram: FloatArray, terms: FloatArray) -> int:
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+def _fill_moments(local: FloatArray, n: int, width: float, gram: FloatArray, terms: FloatArray) -> float:
     """Fill the normal equations of a quadric over the plane from points whose last residual is within `width`."""
     x1, y1, x2, xy, y2 = 0.0, 0.0, 0.0, 0.0, 0.0
     x3, x2y, xy2, y3 = 0.0, 0.0, 0.0, 0.0
     x4, x3y, x2y2, xy3, y4 = 0.0, 0.0, 0.0, 0.0, 0.0
     z1, xz, yz, x2z, xyz, y2z = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    count = 0
+    count = 0.0
     for i in range(n):
-        if width < math.inf and abs(local[i, 3]) > width:
-            continue
-        x, y, z = local[i, 0], local[i, 1], local[i, 2]
+        one = 1.0 if abs(local[3, i]) <= width else 0.0
+        x, y, z = one * local[0, i], one * local[1, i], one * local[2, i]
         xx, product, yy = x * x, x * y, y * y
         x1, y1, x2, xy, y2 = x1 + x, y1 + y, x2 + xx, xy + product, y2 + yy
         x3, x2y, xy2, y3 = x3 + xx * x, x2y + xx * y, xy2 + x * yy, y3 + yy * y
         x4, x3y, x2y2, xy3, y4 = x4 + xx * xx, x3y + xx * product, x2y2 + xx * yy, xy3 + product * yy, y4 + yy * yy
         z1, xz, yz = z1 + z, xz + x * z, yz + y * z
         x2z, xyz, y2z = x2z + xx * z, xyz + product * z, y2z + yy * z
-        count += 1
+        count += one
     terms[0], terms[1], terms[2], terms[3], terms[4], terms[5] = x2z, xyz, y2z, xz, yz, z1
     gram[0, 0], gram[0, 1], gram[0, 2], gram[0, 3], gram[0, 4], gram[0, 5] = x4, x3y, x2y2, x3, x2y, x2
     gram[1, 1], gram[1, 2], gram[1, 3], gram[1, 4], gram[1, 5] = x2y2, xy3, x2y, xy2, xy
@@ -163,6 +174,19 @@ def _fill_moments(local: FloatArray, n: int, width: float, gram: FloatArray, ter
         for b in range(a):
             gram[a, b] = gram[b, a]
     return count
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+def _fill_residuals(local: FloatArray, n: int, width: float, terms: FloatArray) -> float:
+    """Fill in the residuals; give the sum of their sizes over the points whose last one was within `width`."""
+    a, b, c, d, e, f = terms[0], terms[1], terms[2], terms[3], terms[4], terms[5]
+    total = 0.0
+    for i in range(n):
+        x, y = local[0, i], local[1, i]
+        z = local[2, i] - (a * x * x + b * x * y + c * y * y + d * x + e * y + f)
+        total += abs(z) if abs(local[3, i]) <= width else 0.0
+        local[3, i] = z
+    return total
 
 
 @njit(cache=True, nogil=True)

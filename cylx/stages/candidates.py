@@ -126,7 +126,7 @@ def _polish(
     rows: FloatArray,
     kept: NDArray[np.bool_],
 ) -> None:
-    found, around = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3))
+    found, around = np.empty(CAPACITY, np.int64), np.empty((3, CAPACITY))
     quality, center = np.empty(3), np.empty(3)
     for c in range(len(rows)):
         model = rows[c, :7]
@@ -137,7 +137,7 @@ def _polish(
         n = gather_ball(points, cells, starts, side, center, 2.0 * first, found)
         for a in range(n):
             for d in range(3):
-                around[a, d] = points[found[a], d] - center[d]
+                around[d, a] = points[found[a], d] - center[d]
         low, high = max(least, 0.5 * first), min(greatest, 2.0 * first)
         if polish(around, n, model, noise, low, high, min_inliers, min_share, 0.5 * first, quality) < 2:
             continue

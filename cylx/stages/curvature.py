@@ -140,8 +140,8 @@ def _scan(
     marks: MaskArray,
 ) -> None:
     found = np.empty(CAPACITY, np.int64)
-    around, inner = np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
-    plane, local = np.empty((2, 3)), np.empty((CAPACITY, 4))
+    around, inner = np.empty((3, CAPACITY)), np.empty((3, CAPACITY))
+    plane, local = np.empty((2, 3)), np.empty((4, CAPACITY))
     matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
     right, axes = np.empty(6), np.empty((2, 3))
     quality = np.empty(3)
@@ -189,18 +189,18 @@ def _center_window(
     for a in range(n):
         square = 0.0
         for d in range(3):
-            around[a, d] = points[found[a], d] - seed[d]
-            square += around[a, d] ** 2
+            around[d, a] = points[found[a], d] - seed[d]
+            square += around[d, a] ** 2
         if square < radius * radius:
             for d in range(3):
-                inner[m, d] = around[a, d]
+                inner[d, m] = around[d, a]
             m += 1
     return m
 
 
 @njit(cache=True, nogil=True)
 def _mark_explained(
-    points: FloatArray,
+    xyz: FloatArray,
     found: IndexArray,
     n: int,
     model: FloatArray,
@@ -211,7 +211,7 @@ def _mark_explained(
     """Mark the points of a window that lie on its cylinder; threads may mark the same ones, which does no harm."""
     fill_frame(model[3:6], frame)
     for i in range(n):
-        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+        dx, dy, dz = xyz[0, i] - model[0], xyz[1, i] - model[1], xyz[2, i] - model[2]
         x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
         y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
         if abs(math.sqrt(x * x + y * y) - model[6]) < width:

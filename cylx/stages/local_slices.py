@@ -157,7 +157,7 @@ def _slice_windows(
     rows: FloatArray,
     counts: IndexArray,
 ) -> None:
-    found, around, alone = np.empty(CAPACITY, np.int64), np.empty((CAPACITY, 3)), np.empty((CAPACITY, 3))
+    found, around, alone = np.empty(CAPACITY, np.int64), np.empty((3, CAPACITY)), np.empty((3, CAPACITY))
     flat, samples = np.empty((CAPACITY, 2)), np.empty((SAMPLES, 5), np.int64)
     model, normal, frame, shape, quality = np.empty(7), np.empty(3), np.empty((2, 3)), np.empty(5), np.empty(3)
     for s in range(len(seeds)):
@@ -179,7 +179,7 @@ def _slice_windows(
             else:
                 state = _draw(_fill_normal(state, normal))
                 k = (state >> 20) % n
-                offset = around[k, 0] * normal[0] + around[k, 1] * normal[1] + around[k, 2] * normal[2]
+                offset = around[0, k] * normal[0] + around[1, k] * normal[1] + around[2, k] * normal[2]
             fill_frame(normal, frame)
             own = alone if p == 0 else around
             m = _project(own, size, normal, offset, thick, frame, flat)
@@ -209,11 +209,11 @@ def _copy_about(points: FloatArray, found: IndexArray, n: int, seed: FloatArray,
     """Copy the points of a window, its seed at zero."""
     for a in range(n):
         for d in range(3):
-            around[a, d] = points[found[a], d] - seed[d]
+            around[d, a] = points[found[a], d] - seed[d]
 
 
 @njit(cache=True, nogil=True)
-def _pick_slim(points: FloatArray, n: int, reach: float, direction: FloatArray, out: FloatArray) -> int:
+def _pick_slim(xyz: FloatArray, n: int, reach: float, direction: FloatArray, out: FloatArray) -> int:
     """Fill in the points along the longest direction of what is about zero, if that is slim; count them.
 
     Of several pipes side by side a smaller part of the window shows the one it was laid about.
@@ -222,13 +222,13 @@ def _pick_slim(points: FloatArray, n: int, reach: float, direction: FloatArray, 
     for part in (1.0, 0.6, 0.36):
         for d in range(3):
             place[d] = 0.0
-        across, along = fit_line(points, n, part * reach, place, direction)
+        across, along = fit_line(xyz, n, part * reach, place, direction)
         if across < SLIM * along:
             m = 0
             for i in range(n):
-                if off_line(points, i, place, direction) < 3.0 * across:
+                if off_line(xyz, i, place, direction) < 3.0 * across:
                     for d in range(3):
-                        out[m, d] = points[i, d]
+                        out[d, m] = xyz[d, i]
                     m += 1
             return m
     return 0
@@ -281,12 +281,12 @@ def _fill_normal(state: int, normal: FloatArray) -> int:
 
 @njit(cache=True, nogil=True)
 def _project(
-    points: FloatArray, n: int, normal: FloatArray, offset: float, thick: float, frame: FloatArray, flat: FloatArray
+    xyz: FloatArray, n: int, normal: FloatArray, offset: float, thick: float, frame: FloatArray, flat: FloatArray
 ) -> int:
     """Fill in the coordinates in the plane of the points close to it; count them."""
     m = 0
     for i in range(n):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        x, y, z = xyz[0, i], xyz[1, i], xyz[2, i]
         if abs(x * normal[0] + y * normal[1] + z * normal[2] - offset) < thick:
             flat[m, 0] = x * frame[0, 0] + y * frame[0, 1] + z * frame[0, 2]
             flat[m, 1] = x * frame[1, 0] + y * frame[1, 1] + z * frame[1, 2]
