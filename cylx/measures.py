@@ -159,8 +159,8 @@ def shape_of(shell: Shell, segment: Segment, deviation: float) -> dict[str, floa
     gram, right = np.zeros((9, 9)), np.zeros(9)
     _fill_shape(shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on], gram, right)
     gram[np.diag_indices(9)] *= 1.0 + 1e-12
-    covariance = np.linalg.pinv(gram[:5, :5], hermitian=True) * deviation**2
-    wider = np.linalg.pinv(gram[:7, :7], hermitian=True)
+    covariance = _inverse(gram[:5, :5]) * deviation**2
+    wider = _inverse(gram[:7, :7])
     terms = wider @ right[:7]
     errors = np.sqrt(np.maximum(np.diag(wider), 0.0)) * deviation
     bend, bend_error = _bend(gram, right)
@@ -177,10 +177,18 @@ def shape_of(shell: Shell, segment: Segment, deviation: float) -> dict[str, floa
     }
 
 
+def _inverse(gram: FloatArray) -> FloatArray:
+    """Invert a matrix of normal equations; what nothing is known of is left out where it cannot be inverted."""
+    try:
+        return np.asarray(np.linalg.inv(gram), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(gram, hermitian=True), dtype=np.float64)
+
+
 def _bend(gram: FloatArray, right: FloatArray) -> tuple[float, float]:
     """Give how far the axis is off the straight at the ends, and the standard error of that for unit noise."""
     which = np.array([0, 1, 2, 3, 4, 7, 8])
-    inverse = np.linalg.pinv(gram[np.ix_(which, which)], hermitian=True)
+    inverse = _inverse(gram[np.ix_(which, which)])
     aside = (inverse @ right[which])[5:]
     size = float(np.hypot(*aside))
     way = aside / size if size > 0.0 else np.array([1.0, 0.0])

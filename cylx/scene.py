@@ -90,6 +90,11 @@ def _bounds(points: FloatArray) -> FloatArray:
     return bounds
 
 
+def _extent(points: FloatArray) -> float:
+    """Give the diagonal of the bounding box."""
+    return float(np.linalg.norm(np.ptp(_bounds(points), axis=0)))
+
+
 @njit(cache=True, nogil=True)
 def _fill_bounds(points: FloatArray, bounds: FloatArray) -> None:
     for d in range(3):
@@ -175,10 +180,10 @@ def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
     """
     ordered, _, codes, unit = canonical_order(points)
     spacing, _, noise, _ = measure_surface(ordered, codes, unit, np.random.default_rng([seed, 1]))
-    return Scene(spacing, noise, float(np.linalg.norm(np.ptp(points, axis=0))))
+    return Scene(spacing, noise, _extent(points))
 
 
-def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
+def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Frame, Scene]:
     """Measure a cloud and put it into its own frame.
 
     Parameters
@@ -187,6 +192,8 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
         Scene units, usable (see `check_usable`).
     config : Config
         Spacing and noise given here are taken as known.
+    threads : int
+        Do not change the result.
 
     Returns
     -------
@@ -197,13 +204,13 @@ def make_frame(points: FloatArray, config: Config) -> tuple[Frame, Scene]:
     """
     ordered, order, codes, unit = canonical_order(points)
     rng = np.random.default_rng([config.seed, 1])
-    spacing, dense, measured, patches = measure_surface(ordered, codes, unit, rng)
+    spacing, dense, measured, patches = measure_surface(ordered, codes, unit, rng, threads)
     noise = config.scene.noise or measured
     with ThreadPoolExecutor(1) as pool:  # the noise over larger pieces is measured while the points are put in order
-        measuring = pool.submit(noise_by_size, ordered, codes, unit, spacing, measured, rng)
+        measuring = pool.submit(noise_by_size, ordered, codes, unit, spacing, measured, rng, threads)
         dense *= (config.scene.spacing or spacing) / spacing
         spacing = config.scene.spacing or spacing
-        scene = Scene(spacing, noise, float(np.linalg.norm(np.ptp(points, axis=0))))
+        scene = Scene(spacing, noise, _extent(points))
         window = max(config.candidates.window_spacings * dense, config.candidates.window_noises * noise) / spacing
         # cells are powers of two of a voxel that puts 6 x 6 points of a plane into the radius of the smallest window
         voxel = window / 6.0

@@ -13,6 +13,9 @@ from cylx.geometry.morton import BITS, cell_starts
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
+BLOCK = 32
+"""Runs in a block; most blocks lie apart from a line as a whole."""
+
 
 class Cells:
     """A cloud in Morton order, cut into runs of neighbouring points.
@@ -33,9 +36,8 @@ class Cells:
         while level < BITS and occupancy * (np.count_nonzero(np.diff(codes >> (3 * level))) + 1) > len(codes):
             level += 1
         _, self._starts = cell_starts(codes, level)
-        count = len(self._starts) - 1
-        self._centers, self._reaches = np.empty((count, 3)), np.empty(count)
-        _fill_balls(points, self._starts, self._centers, self._reaches)
+        self._balls = _balls_of(points, self._starts)
+        self._blocks = _balls_of(points, np.append(self._starts[:-1:BLOCK], self._starts[-1]))
 
     def near_cylinder(self, model: FloatArray, low: float, high: float, inner: float, outer: float) -> IndexArray:
         """Give the points between two heights and two distances from an axis.
@@ -54,9 +56,10 @@ class Cells:
         ndarray of int64
             Ascending indices.
         """
-        most = _count_near(self._centers, self._reaches, self._starts, model, low, high, inner, outer)
+        runs = np.empty(len(self._balls), np.int64)
+        count, most = _find_runs(self._blocks, self._balls, self._starts, model, low, high, inner, outer, runs)
         found = np.empty(most, np.int64)
-        n = _gather_near(self.points, self._centers, self._reaches, self._starts, model, low, high, inner, outer, found)
+        n = _gather_near(self.points, self._starts, runs[:count], model, low, high, inner, outer, found)
         return found[:n]
 
     def surface_points(
@@ -104,19 +107,26 @@ def _copy_marked(
     return n
 
 
+def _balls_of(points: FloatArray, starts: IndexArray) -> FloatArray:
+    """Give centre and radius of a ball about each run of points, shape (C, 4)."""
+    balls = np.empty((len(starts) - 1, 4))
+    _fill_balls(points, starts, balls)
+    return balls
+
+
 @njit(cache=True, nogil=True)
-def _fill_balls(points: FloatArray, starts: IndexArray, centers: FloatArray, reaches: FloatArray) -> None:
-    for c in range(len(reaches)):
+def _fill_balls(points: FloatArray, starts: IndexArray, balls: FloatArray) -> None:
+    for c in range(len(balls)):
         for d in range(3):
             low, high = math.inf, -math.inf
             for i in range(starts[c], starts[c + 1]):
                 low, high = min(low, points[i, d]), max(high, points[i, d])
-            centers[c, d] = 0.5 * (low + high)
+            balls[c, d] = 0.5 * (low + high)
         square = 0.0
         for i in range(starts[c], starts[c + 1]):
-            dx, dy, dz = points[i, 0] - centers[c, 0], points[i, 1] - centers[c, 1], points[i, 2] - centers[c, 2]
+            dx, dy, dz = points[i, 0] - balls[c, 0], points[i, 1] - balls[c, 1], points[i, 2] - balls[c, 2]
             square = max(square, dx * dx + dy * dy + dz * dz)
-        reaches[c] = math.sqrt(square)
+        balls[c, 3] = math.sqrt(square)
 
 
 @njit(cache=True, nogil=True)
@@ -135,29 +145,35 @@ def _apart(
 
 
 @njit(cache=True, nogil=True)
-def _count_near(
-    centers: FloatArray,
-    reaches: FloatArray,
+def _find_runs(
+    blocks: FloatArray,
+    balls: FloatArray,
     starts: IndexArray,
     model: FloatArray,
     low: float,
     high: float,
     inner: float,
     outer: float,
-) -> int:
-    most = 0
-    for c in range(len(reaches)):
-        if not _apart(centers[c, 0], centers[c, 1], centers[c, 2], reaches[c], model, low, high, inner, outer):
-            most += starts[c + 1] - starts[c]
-    return most
+    runs: IndexArray,
+) -> tuple[int, int]:
+    """Fill in the runs that may have points in the hollow cylinder; count them, and their points."""
+    count, most = 0, 0
+    for b in range(len(blocks)):
+        if _apart(blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3], model, low, high, inner, outer):
+            continue
+        for c in range(b * BLOCK, min((b + 1) * BLOCK, len(balls))):
+            if not _apart(balls[c, 0], balls[c, 1], balls[c, 2], balls[c, 3], model, low, high, inner, outer):
+                runs[count] = c
+                count += 1
+                most += starts[c + 1] - starts[c]
+    return count, most
 
 
 @njit(cache=True, nogil=True)
 def _gather_near(
     points: FloatArray,
-    centers: FloatArray,
-    reaches: FloatArray,
     starts: IndexArray,
+    runs: IndexArray,
     model: FloatArray,
     low: float,
     high: float,
@@ -166,9 +182,7 @@ def _gather_near(
     found: IndexArray,
 ) -> int:
     n = 0
-    for c in range(len(reaches)):
-        if _apart(centers[c, 0], centers[c, 1], centers[c, 2], reaches[c], model, low, high, inner, outer):
-            continue
+    for c in runs:
         for i in range(starts[c], starts[c + 1]):
             if not _apart(points[i, 0], points[i, 1], points[i, 2], 0.0, model, low, high, inner, outer):
                 found[n] = i

@@ -70,8 +70,8 @@ def core_spread(patches: FloatArray) -> FloatArray:
 def _over_own_plane(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Give design matrix (m, k, 6), heights (m, k), in-plane rms and the least rms in the plane, (m,), of patches."""
     offsets = patches - patches.mean(axis=1, keepdims=True)
-    _, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", offsets, offsets))
-    height, x, y = (np.einsum("mki,mi->mk", offsets, axes[:, :, a]) for a in (0, 1, 2))
+    _, axes = np.linalg.eigh(offsets.transpose(0, 2, 1) @ offsets)
+    height, x, y = (axes.transpose(0, 2, 1) @ offsets.transpose(0, 2, 1)).transpose(1, 0, 2)
     width = np.sqrt((x * x + y * y).mean(axis=1))
     narrow = np.sqrt((x * x).mean(axis=1))  # eigenvectors come by ascending eigenvalue
     scale = np.where(width > 0, width, 1.0)[:, None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
@@ -51,7 +52,7 @@ class Patches(NamedTuple):
 
 
 def measure_surface(
-    points: FloatArray, codes: IndexArray, unit: float, rng: np.random.Generator
+    points: FloatArray, codes: IndexArray, unit: float, rng: np.random.Generator, threads: int = 1
 ) -> tuple[float, float, float, Patches]:
     """Measure how far apart the points of a cloud lie and how far they scatter about their surfaces.
 
@@ -63,6 +64,8 @@ def measure_surface(
     unit : float
         Side of the smallest cell.
     rng : numpy.random.Generator
+    threads : int
+        Do not change the result.
 
     Returns
     -------
@@ -92,7 +95,7 @@ def measure_surface(
             enough = 0.5 * len(todo)
         if size < 9:
             continue
-        near, radius = _nearest(points, cells, starts, unit * 2.0**level, sample[todo], size)
+        near, radius = _nearest(points, cells, starts, unit * 2.0**level, sample[todo], size, threads)
         sd, width, narrow = quadric_spread(points[near])
         wide = width > WIDE * sd
         if count in THICK:
@@ -167,9 +170,21 @@ def _balls(
 
 
 def _nearest(
-    points: FloatArray, cells: IndexArray, starts: IndexArray, side: float, sample: IndexArray, size: int
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    sample: IndexArray,
+    size: int,
+    threads: int,
 ) -> tuple[IndexArray, FloatArray]:
     """Give the `size` nearest neighbours of each sample point, itself among them, and the distance of the last."""
     near, radius = np.empty((len(sample), size + 1), np.int64), np.empty(len(sample))
-    _balls(points, cells, starts, side, sample, size, near, radius)
+
+    def work(part: slice) -> None:
+        _balls(points, cells, starts, side, sample[part], size, near[part], radius[part])
+
+    step = -(-len(sample) // threads)
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, [slice(first, first + step) for first in range(0, len(sample), step)]))
     return near, radius

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
@@ -68,39 +69,59 @@ def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tup
 
 
 def noise_by_size(
-    points: FloatArray, codes: IndexArray, unit: float, spacing: float, noise: float, rng: np.random.Generator
+    points: FloatArray,
+    codes: IndexArray,
+    unit: float,
+    spacing: float,
+    noise: float,
+    rng: np.random.Generator,
+    threads: int = 1,
 ) -> tuple[FloatArray, FloatArray]:
     """Measure the noise over larger and larger flat pieces, as long as there are such and most of them agree.
 
     The residuals of curved pieces show their shape as soon as they are large; those of flat ones show noise at any
     size.
     """
+    larger = [8.0 * spacing, 16.0 * spacing, 32.0 * spacing, 64.0 * spacing]
+    samples = [np.sort(rng.choice(len(points), min(PIECES, len(points)), replace=False)) for _ in larger]
+
+    def work(size: float, sample: IndexArray) -> float | None:
+        return _noise_of_flat(points, codes, unit, size, sample, 1e-12 * spacing)
+
+    with ThreadPoolExecutor(threads) as pool:
+        modes = list(pool.map(work, larger, samples))
     sizes, deviations = [4.0 * spacing], [noise]
-    while len(sizes) < 5:
-        size = 2.0 * sizes[-1]
-        level = min(BITS, max(0, math.floor(math.log2(size / unit))))
-        cells, starts = cell_starts(codes, level)
-        sample = np.sort(rng.choice(len(points), min(PIECES, len(points)), replace=False))
-        patches = np.empty((len(sample), PATCH, 3))
-        full = np.zeros(len(sample), np.bool_)
-        _fill_patches(points, cells, starts, unit * 2.0**level, sample, size, patches, full)
-        if full.mean() < 0.5:
-            break
-        sd, width, _ = quadric_spread(patches[full])
-        value = np.maximum(np.minimum(sd, core_spread(patches[full]) / MAD_SHRINKAGE), 1e-12 * spacing)
-        covariance = np.einsum("mki,mkj->mij", *2 * (patches[full] - patches[full].mean(axis=1, keepdims=True),))
-        thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, 0], 0.0) / PATCH)
-        flat = (value < width / 8.0) & (thickness < 2.0 * value)
-        if flat.sum() < max(20, 0.15 * len(flat)):
-            break
-        mode = half_sample_mode(value[flat])
-        if (np.abs(np.log(value[flat] / mode)) < 0.3).mean() < 0.4:
+    for size, mode in zip(larger, modes, strict=True):
+        if mode is None:
             break
         sizes.append(size)
         deviations.append(min(max(mode, deviations[-1]), 2.0 * deviations[-1]))
     # a tenth is the scatter of the estimate itself
     grown = np.where(np.array(deviations) > 1.15 * noise, deviations, noise)
     return np.array(sizes), np.maximum.accumulate(grown)
+
+
+def _noise_of_flat(
+    points: FloatArray, codes: IndexArray, unit: float, size: float, sample: IndexArray, least: float
+) -> float | None:
+    """Give the noise over the flat ones of pieces of a size; None if there are few of them, or they do not agree."""
+    level = min(BITS, max(0, math.floor(math.log2(size / unit))))
+    cells, starts = cell_starts(codes, level)
+    patches = np.empty((len(sample), PATCH, 3))
+    full = np.zeros(len(sample), np.bool_)
+    _fill_patches(points, cells, starts, unit * 2.0**level, sample, size, patches, full)
+    if full.mean() < 0.5:
+        return None
+    patches = patches[full]
+    sd, width, _ = quadric_spread(patches)
+    value = np.maximum(np.minimum(sd, core_spread(patches) / MAD_SHRINKAGE), least)
+    offsets = patches - patches.mean(axis=1, keepdims=True)
+    thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(offsets.transpose(0, 2, 1) @ offsets)[:, 0], 0.0) / PATCH)
+    flat = (value < width / 8.0) & (thickness < 2.0 * value)
+    if flat.sum() < max(20, 0.15 * len(flat)):
+        return None
+    mode = half_sample_mode(value[flat])
+    return mode if (np.abs(np.log(value[flat] / mode)) < 0.3).mean() >= 0.4 else None
 
 
 @njit(cache=True, nogil=True)

@@ -62,7 +62,7 @@ def extract_cylinders(
 
         return extract_by_competitor(cloud, config, threads, journal)
     with journal.stage("scene"):
-        frame, scene = make_frame(cloud.points, config)
+        frame, scene = make_frame(cloud.points, config, threads)
         scene = replace(scene, given=config.scene.given)
         config = resolve(config, scene)
         radii = radius_range(config, frame)

@@ -46,7 +46,7 @@ def extract_by_competitor(cloud: PointCloud, config: Config, threads: int, journ
         If the method needs open3d, and it cannot be imported.
     """
     with journal.stage("scene"):
-        frame, scene = make_frame(cloud.points, config)
+        frame, scene = make_frame(cloud.points, config, threads)
         scene = replace(scene, given=config.scene.given)
         config = resolve(config, scene)
         radii = radius_range(config, frame)
