@@ -10,8 +10,8 @@ noise. False fits weigh double. `tests/benchmarks/evidence` makes the scenes and
 against its own meaning: the signs are fixed before the fit.
 
 What is not fitted are the terms themselves: `FORM`, `FORM_NOISES`, `TELLING`, `THIN`, `BEHIND`, and the limits in the
-terms. Some hundred variants were compared, by cross-validation and with the scenes of `docs/benchmarks.md` in view. Fits near a
-true cylinder that were neither clearly it nor clearly another were left out.
+terms. Some hundred variants were compared, by cross-validation and with the scenes of `docs/benchmarks.md` in view.
+Fits near a true cylinder that were neither clearly it nor clearly another were left out.
 """
 
 from __future__ import annotations
