@@ -10,12 +10,12 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cylx.catalogue import Catalogue
 from cylx.config import Config
 from cylx.errors import InputError
+from cylx.geometry.bounding_box import box_of, extent_of, fill_scatter, widest_deviation
 from cylx.geometry.mixture_fit import Prior
 from cylx.geometry.morton import BITS, morton_codes
 from cylx.noise import measure_surface, noise_by_place, noise_by_size
@@ -43,14 +43,14 @@ def check_usable(points: FloatArray, place: str) -> None:
     if len(points) < 5:
         raise InputError(place, f"only {len(points)} usable point{'s' if len(points) != 1 else ''}", remedy)
     corner, side = cell_cube(points)
-    if side < float(np.ptp(_bounds(points), axis=0).max()):
+    if side < float(np.ptp(box_of(points), axis=0).max()):
         points = points[((points >= corner) & (points <= corner + side)).all(axis=1)]
-    low, high = _bounds(points)
+    low, high = box_of(points)
     extent = float(np.linalg.norm(high - low))
     if extent == 0:
         raise InputError(place, "all points are equal", remedy)
     scatter = np.zeros((3, 3))
-    _fill_scatter(points, low, 1.0 / extent, scatter)
+    fill_scatter(points, low, 1.0 / extent, scatter)
     widths = np.sqrt(np.maximum(np.linalg.eigvalsh(scatter), 0.0))
     # the covariance of exactly flat points keeps rounding of its own size, and coordinates far away keep theirs
     rounding = 1e-7 + 4.0 * float(np.spacing(np.abs([low, high]).max())) / extent
@@ -72,70 +72,15 @@ def cell_cube(points: FloatArray, enough: float = 0.0) -> tuple[FloatArray, floa
     enough : float
         A cube of this side can be resolved in any case.
     """
-    low, high = _bounds(points)
+    low, high = box_of(points)
     side = float((high - low).max())
-    if side <= enough or side <= STRAY * _widest_deviation(points, low):
+    if side <= enough or side <= STRAY * widest_deviation(points, low):
         return low, side
     bounds = np.quantile(points, [0.01, 0.99], axis=0)
     limit = max(enough, FAR * float(np.ptp(bounds, axis=0).max()))
     if side <= limit or limit == 0:
         return low, side
     return bounds.mean(axis=0) - 0.5 * limit, limit
-
-
-def _bounds(points: FloatArray) -> FloatArray:
-    """Give the least and the greatest coordinates, shape (2, 3)."""
-    bounds = np.empty((2, 3))
-    _fill_bounds(points, bounds)
-    return bounds
-
-
-def _extent(points: FloatArray) -> float:
-    """Give the diagonal of the bounding box."""
-    return float(np.linalg.norm(np.ptp(_bounds(points), axis=0)))
-
-
-@njit(cache=True, nogil=True)
-def _fill_bounds(points: FloatArray, bounds: FloatArray) -> None:
-    for d in range(3):
-        bounds[0, d], bounds[1, d] = math.inf, -math.inf
-    for i in range(len(points)):
-        for d in range(3):
-            bounds[0, d], bounds[1, d] = min(bounds[0, d], points[i, d]), max(bounds[1, d], points[i, d])
-
-
-@njit(cache=True, nogil=True)
-def _widest_deviation(points: FloatArray, low: FloatArray) -> float:
-    """Give the mean absolute deviation from the mean, of the coordinate where it is greatest."""
-    widest = 0.0
-    for d in range(3):
-        mean, total = 0.0, 0.0
-        for i in range(len(points)):
-            mean += (points[i, d] - low[d]) / len(points)
-        for i in range(len(points)):
-            total += abs(points[i, d] - low[d] - mean)
-        widest = max(widest, total / len(points))
-    return widest
-
-
-@njit(cache=True, nogil=True)
-def _fill_scatter(points: FloatArray, low: FloatArray, scale: float, scatter: FloatArray) -> None:
-    """Fill in the covariance (3, 3) of the points times a scale, about their mean."""
-    mean, count = np.zeros(3), len(points)
-    for i in range(count):
-        for d in range(3):
-            mean[d] += (points[i, d] - low[d]) * scale / count
-    for i in range(count):
-        x = (points[i, 0] - low[0]) * scale - mean[0]
-        y = (points[i, 1] - low[1]) * scale - mean[1]
-        z = (points[i, 2] - low[2]) * scale - mean[2]
-        scatter[0, 0] += x * x / count
-        scatter[1, 0] += x * y / count
-        scatter[1, 1] += y * y / count
-        scatter[2, 0] += x * z / count
-        scatter[2, 1] += y * z / count
-        scatter[2, 2] += z * z / count
-    scatter[0, 1], scatter[0, 2], scatter[1, 2] = scatter[1, 0], scatter[2, 0], scatter[2, 1]
 
 
 def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray, float]:
@@ -180,7 +125,7 @@ def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
     """
     ordered, _, codes, unit = canonical_order(points)
     spacing, _, noise, _ = measure_surface(ordered, codes, unit, np.random.default_rng([seed, 1]))
-    return Scene(spacing, noise, _extent(points))
+    return Scene(spacing, noise, extent_of(points))
 
 
 def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Frame, Scene]:
@@ -210,7 +155,7 @@ def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Fr
         measuring = pool.submit(noise_by_size, ordered, codes, unit, spacing, measured, rng, threads)
         dense *= (config.scene.spacing or spacing) / spacing
         spacing = config.scene.spacing or spacing
-        scene = Scene(spacing, noise, _extent(points))
+        scene = Scene(spacing, noise, extent_of(points))
         window = max(config.candidates.window_spacings * dense, config.candidates.window_noises * noise) / spacing
         # cells are powers of two of a voxel that puts 6 x 6 points of a plane into the radius of the smallest window
         voxel = window / 6.0

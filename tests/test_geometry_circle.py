@@ -19,7 +19,7 @@ def ring(rng, n, center, radius, arc=2 * np.pi):
 
 def search(points, samples, tolerance, radii=ANY):
     shape = np.full(5, np.nan)
-    return search_circle(points, samples, tolerance, *radii, shape), shape
+    return search_circle(np.ascontiguousarray(points.T), len(points), samples, tolerance, *radii, shape), shape
 
 
 def samples_of(rng, n, count=60):

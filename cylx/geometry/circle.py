@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.simd import REORDERED
 from cylx.geometry.small_matrices import solve_in_place
 
 FloatArray = NDArray[np.float64]
@@ -16,7 +17,8 @@ IndexArray = NDArray[np.int64]
 
 @njit(cache=True, nogil=True)
 def search_circle(
-    points: FloatArray,
+    xy: FloatArray,
+    n: int,
     samples: IndexArray,
     tolerance: float,
     least: float,
@@ -27,7 +29,9 @@ def search_circle(
 
     Parameters
     ----------
-    points : ndarray of shape (n, 2)
+    xy : ndarray of shape (2, >= n)
+    n : int
+        Number of points.
     samples : ndarray of shape (k, >= 3)
         Indices of points.
     tolerance : float
@@ -44,9 +48,9 @@ def search_circle(
     """
     record = 0.0
     for k in range(len(samples)):
-        ax, ay = points[samples[k, 0], 0], points[samples[k, 0], 1]
-        bx, by = points[samples[k, 1], 0] - ax, points[samples[k, 1], 1] - ay
-        cx, cy = points[samples[k, 2], 0] - ax, points[samples[k, 2], 1] - ay
+        ax, ay = xy[0, samples[k, 0]], xy[1, samples[k, 0]]
+        bx, by = xy[0, samples[k, 1]] - ax, xy[1, samples[k, 1]] - ay
+        cx, cy = xy[0, samples[k, 2]] - ax, xy[1, samples[k, 2]] - ay
         det = 2.0 * (bx * cy - by * cx)
         if det == 0.0:
             continue
@@ -55,15 +59,22 @@ def search_circle(
         radius = math.sqrt(x * x + y * y)
         if not (least <= radius <= greatest):
             continue
-        score = 0.0
-        for i in range(len(points)):
-            distance = math.sqrt((points[i, 0] - ax - x) ** 2 + (points[i, 1] - ay - y) ** 2) - radius
-            if abs(distance) < tolerance:
-                score += 1.0 - (distance / tolerance) ** 2
+        score = _support(xy, n, ax + x, ay + y, radius, tolerance)
         if score > record:
             record = score
             shape[0], shape[1], shape[2], shape[3], shape[4] = ax + x, ay + y, radius, radius, 0.0
     return record
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+def _support(xy: FloatArray, n: int, x: float, y: float, radius: float, tolerance: float) -> float:
+    score = 0.0
+    for i in range(n):
+        dx, dy = xy[0, i] - x, xy[1, i] - y
+        ratio = (math.sqrt(dx * dx + dy * dy) - radius) / tolerance
+        rest = 1.0 - ratio * ratio
+        score += rest if rest > 0.0 else 0.0
+    return score
 
 
 def fit_circle(points: FloatArray, steps: int = 4) -> tuple[FloatArray, float] | None:

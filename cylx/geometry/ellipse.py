@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.simd import REORDERED
 from cylx.geometry.small_matrices import solve_in_place
 
 FloatArray = NDArray[np.float64]
@@ -195,7 +196,8 @@ def search_ellipse(
     middle = points.mean(axis=0)
     offsets = np.ascontiguousarray(points - middle)
     best = np.empty(6)
-    score = search_conic(offsets, samples, tolerance, semi_minor[0], semi_minor[1], max_aspect, best)
+    xy = np.ascontiguousarray(offsets.T)
+    score = search_conic(xy, len(offsets), samples, tolerance, semi_minor[0], semi_minor[1], max_aspect, best)
     if score <= 0.0:
         return Degenerate("no ellipse within the limits")
     shape = _from_conic(best)
@@ -217,7 +219,8 @@ def search_ellipse(
 
 @njit(cache=True, nogil=True)
 def search_conic(
-    points: FloatArray,
+    xy: FloatArray,
+    n: int,
     samples: IndexArray,
     tolerance: float,
     least: float,
@@ -225,12 +228,12 @@ def search_conic(
     max_aspect: float,
     best: FloatArray,
 ) -> float:
-    """Fill `best` (6,) with the conic through five of the points that has the most support; give that support."""
+    """Fill `best` (6,) with the conic through five of xy[:, :n] that has the most support; give that support."""
     matrix, right = np.empty((5, 5)), np.empty(5)
     record = 0.0
     for k in range(len(samples)):
         for i in range(5):
-            x, y = points[samples[k, i], 0], points[samples[k, i], 1]
+            x, y = xy[0, samples[k, i]], xy[1, samples[k, i]]
             matrix[i, 0], matrix[i, 1], matrix[i, 2], matrix[i, 3], matrix[i, 4] = x * x, x * y, y * y, x, y
             right[i] = -1.0
         if not solve_in_place(matrix, right):
@@ -250,15 +253,22 @@ def search_conic(
             major, minor = minor, major
         if minor < least or minor > greatest or major > max_aspect * minor:
             continue
-        score = 0.0
-        for i in range(len(points)):
-            x, y = points[i, 0], points[i, 1]
-            value = a * x * x + b * x * y + c * y * y + d * x + e * y + 1.0
-            gx, gy = 2.0 * a * x + b * y + d, b * x + 2.0 * c * y + e
-            square = value * value / ((gx * gx + gy * gy + 1e-300) * tolerance * tolerance)
-            if square < 1.0:
-                score += 1.0 - square
+        score = _support(xy, n, right, tolerance)
         if score > record:
             record = score
             best[0], best[1], best[2], best[3], best[4], best[5] = a, b, c, d, e, 1.0
     return record
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+def _support(xy: FloatArray, n: int, conic: FloatArray, tolerance: float) -> float:
+    """Add up one minus the squared distance from a conic over the squared tolerance, to first order."""
+    a, b, c, d, e = conic[0], conic[1], conic[2], conic[3], conic[4]
+    score = 0.0
+    for i in range(n):
+        x, y = xy[0, i], xy[1, i]
+        value = a * x * x + b * x * y + c * y * y + d * x + e * y + 1.0
+        gx, gy = 2.0 * a * x + b * y + d, b * x + 2.0 * c * y + e
+        rest = 1.0 - value * value / ((gx * gx + gy * gy + 1e-300) * tolerance * tolerance)
+        score += rest if rest > 0.0 else 0.0
+    return score

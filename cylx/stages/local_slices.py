@@ -158,7 +158,7 @@ def _slice_windows(
     counts: IndexArray,
 ) -> None:
     found, around, alone = np.empty(CAPACITY, np.int64), np.empty((3, CAPACITY)), np.empty((3, CAPACITY))
-    flat, samples = np.empty((CAPACITY, 2)), np.empty((SAMPLES, 5), np.int64)
+    flat, samples = np.empty((2, CAPACITY)), np.empty((SAMPLES, 5), np.int64)
     model, normal, frame, shape, quality = np.empty(7), np.empty(3), np.empty((2, 3)), np.empty(5), np.empty(3)
     for s in range(len(seeds)):
         seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1
@@ -187,7 +187,7 @@ def _slice_windows(
                 counts[1] += 1
                 continue
             state = _fill_samples(state, m, samples)
-            if not _find_shape(flat[:m], samples, noise, reach, p == 0, least, greatest, shape):
+            if not _find_shape(flat, m, samples, noise, reach, p == 0, least, greatest, shape):
                 counts[2] += 1
                 continue
             fits = False
@@ -247,6 +247,7 @@ def _fill_samples(state: int, count: int, samples: IndexArray) -> int:
 @njit(cache=True, nogil=True)
 def _find_shape(
     flat: FloatArray,
+    n: int,
     samples: IndexArray,
     noise: float,
     reach: float,
@@ -257,14 +258,14 @@ def _find_shape(
 ) -> bool:
     """Fill in the ellipse of a slice, a circle if it lies across a cylinder; False if few points support one."""
     if across:
-        support = search_circle(flat, samples, 3.0 * noise + 0.02 * reach, least, greatest, shape)
+        support = search_circle(flat, n, samples, 3.0 * noise + 0.02 * reach, least, greatest, shape)
     else:
         conic = np.empty(6)
         tolerance = 3.0 * noise + 0.06 * THICKNESS * reach
-        support = search_conic(flat, samples, tolerance, least, greatest, 3.0, conic)
+        support = search_conic(flat, n, samples, tolerance, least, greatest, 3.0, conic)
         if support > 0.0 and not conic_shape(conic, shape):
             return False
-    return support >= 0.5 * FEWEST and support >= 0.25 * len(flat)
+    return support >= 0.5 * FEWEST and support >= 0.25 * n
 
 
 @njit(cache=True, nogil=True)
@@ -288,8 +289,8 @@ def _project(
     for i in range(n):
         x, y, z = xyz[0, i], xyz[1, i], xyz[2, i]
         if abs(x * normal[0] + y * normal[1] + z * normal[2] - offset) < thick:
-            flat[m, 0] = x * frame[0, 0] + y * frame[0, 1] + z * frame[0, 2]
-            flat[m, 1] = x * frame[1, 0] + y * frame[1, 1] + z * frame[1, 2]
+            flat[0, m] = x * frame[0, 0] + y * frame[0, 1] + z * frame[0, 2]
+            flat[1, m] = x * frame[1, 0] + y * frame[1, 1] + z * frame[1, 2]
             m += 1
     return m
 
