@@ -41,3 +41,20 @@ def test_it_does_nothing_if_numba_is_there_already():
         f"start(); print(sys.modules.get('{BLAS}', 0) is not None)"
     )
     assert told(program) == "True"
+
+
+def test_a_process_of_its_own_looks_for_no_garbage_and_no_plugins():
+    program = (
+        "import gc, os, sys; import cylx.__main__ as cylx;"
+        "sys.argv = ['cylx', '--version'];"
+        "before = gc.get_threshold(), gc.get_freeze_count(), os.environ.get('PYDANTIC_DISABLE_PLUGINS');\n"
+        "try:\n    cylx.run()\nexcept SystemExit:\n    pass\n"
+        "print(before[0] != gc.get_threshold(), before[1] == 0, gc.get_freeze_count() > 0,"
+        " before[2], os.environ['PYDANTIC_DISABLE_PLUGINS'])"
+    )
+    assert told(program) == "True True True None __all__"
+
+
+def test_a_program_that_imports_cylx_keeps_its_garbage_collector():
+    program = "import gc; before = gc.get_threshold(); import cylx, cylx.cli; print(before == gc.get_threshold())"
+    assert told(program) == "True"
