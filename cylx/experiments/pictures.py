@@ -106,7 +106,9 @@ def _style(summary: Summary, family: list[str]) -> dict[str, Any]:
     """Give a method its colour; several curves of one method differ in shade."""
     if len(family) > 1:
         return {"color": SHADES[family.index(summary.cell.curve) % len(SHADES)]}
-    return {"color": COLORS.get(summary.cell.curve, COLORS[summary.cell.method])}
+    if summary.cell.curve == TOLD:  # behind the default that is not told
+        return {"color": COLORS[TOLD], "zorder": 1.5}
+    return {"color": COLORS[summary.cell.method]}
 
 
 def _boxes(axes: Axes, here: list[Summary], quantity: str, trials: Trials) -> None:
