@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cylx.experiments.figures import TOLD, Figure
+from cylx.experiments.figures import UNSURE, Figure
 from cylx.experiments.study import QUANTITIES, Summary
 from cylx.experiments.table import Trials
 from cylx.matplotlib_door import new_figure
@@ -24,7 +24,7 @@ LABELS = {
 }
 COLORS = {
     "gt": "#1f4e9c", "msac": "#e08214", "line-fit": "#35978f", "tran": "#b2182b", "jin": "#8073ac", "auto": "#000000",
-    TOLD: "#7f7f7f",
+    UNSURE: "#7f7f7f",
 }  # fmt: skip
 SHADES = ("#c7a008", "#35978f", "#1f4e9c", "#7b3294", "#b2182b")
 
@@ -106,8 +106,8 @@ def _style(summary: Summary, family: list[str]) -> dict[str, Any]:
     """Give a method its colour; several curves of one method differ in shade."""
     if len(family) > 1:
         return {"color": SHADES[family.index(summary.cell.curve) % len(SHADES)]}
-    if summary.cell.curve == TOLD:  # behind the default that is not told
-        return {"color": COLORS[TOLD], "zorder": 1.5}
+    if summary.cell.curve == UNSURE:  # behind the default itself
+        return {"color": COLORS[UNSURE], "zorder": 1.5}
     return {"color": COLORS[summary.cell.method]}
 
 

@@ -92,7 +92,7 @@ def config_of(cell: Cell, trial: int, *, most: int, extent: float | None = None)
     trial : int
         Seed.
     most : int
-        Cylinders there are. The default method is not told, but by the settings of a cell.
+        Cylinders there are. The default method is not told.
     extent : float, optional
         Of the scanned object, which the distances of the competitors are shares of.
     """
