@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from cylx.geometry.bounding_box import extent_of
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
 from cylx.geometry.sorting import sort_in_place
@@ -226,9 +227,7 @@ class Frame:
 
     def window_radii(self, octave: float) -> list[float]:
         """Give the radii of windows of all scales, ascending, up to an eighth of the cloud's extent."""
-        extent = float(
-            np.linalg.norm([np.ptp(column) for column in self.points.T])
-        )  # row by row takes five times as long
+        extent = extent_of(self.points)
         steps = max(1, math.ceil(math.log(max(extent / 8.0 / self.window, 1.0)) / math.log(octave)) + 1)
         return [self.window * octave**k for k in range(steps)]
 
