@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.options import Command
+from cylx.cli.options.configuration import Command
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -8,10 +8,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from cylx.cli.outputs import ANNOTATED
-from cylx.cli.staging import STREAM
-from cylx.cli.summary import TABLE, is_own_table
+from cylx.cli.batch.jobs import ANNOTATED
+from cylx.cli.batch.summary import TABLE, is_own_table
 from cylx.errors import InputError
+from cylx.io.outputs import STREAM
 
 
 def find_scans(names: Sequence[str], *, recursive: bool) -> list[str]:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from cylx.cli.failures import DEBUG
+from cylx.cli.terminal.failures import DEBUG
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Bounds = tuple[float | None, float | None]
@@ -152,8 +152,7 @@ def configured(command: Command) -> Command:
         min_coverage_deg: float | None,
         **others: object,
     ) -> object:
-        from cylx.config import check_tolerance, load_config
-        from cylx.config_layers import named_options
+        from cylx.config import check_tolerance, load_config, named_options
 
         options = named_options(
             method=method,
@@ -247,7 +246,7 @@ def talking(command: Command) -> Command:
 
     @functools.wraps(command)
     def with_talk(*args: object, quiet: bool, verbose: bool, **others: object) -> object:
-        from cylx.cli.display import Conversation
+        from cylx.cli.terminal.display import Conversation
 
         return command(*args, talk=Conversation(quiet=quiet, verbose=verbose and not quiet), **others)
 

@@ -12,19 +12,21 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.display import Conversation, found_line, show_table
-from cylx.cli.failures import DEBUG, tell
-from cylx.cli.memory import cores, memory_needed
-from cylx.cli.outcomes import Finished, Outcome, attempt, check_required, entry_of, failed_outcome, lost_outcome
-from cylx.cli.resume import check_own, finished_before, is_own_json
-from cylx.cli.stopwatch import peak_memory
-from cylx.cli.summary import LIST, is_own_table, list_text, table_text
+from cylx.cli.batch.found import found_line
+from cylx.cli.batch.memory import cores, memory_needed
+from cylx.cli.batch.outcomes import Finished, Outcome, check_required, entry_of, failed_outcome, lost_outcome
+from cylx.cli.batch.resume import check_own, finished_before, is_own_json
+from cylx.cli.batch.run import attempt
+from cylx.cli.batch.summary import LIST, is_own_table, list_text, table_text
+from cylx.cli.terminal.display import Conversation, show_table
+from cylx.cli.terminal.failures import DEBUG, tell
+from cylx.cli.terminal.stopwatch import peak_memory
 from cylx.errors import BatchError, NothingFoundError, OutputError
 
 if TYPE_CHECKING:
-    from cylx.cli.batch_options import Many
-    from cylx.cli.extract import Run
-    from cylx.cli.outputs import Job
+    from cylx.cli.batch.jobs import Job
+    from cylx.cli.batch.many import Many
+    from cylx.cli.batch.run import Run
 
 SHORT = 20
 """Of fewer scans than this, each has its line."""
@@ -153,7 +155,7 @@ class Batch:
 
     def _elsewhere(self, jobs: Sequence[Job], processes: int) -> Generator[tuple[int, Outcome], None, None]:
         """Do scans in other processes, each with its share of the cores."""
-        from cylx.cli.workers import Lost, Workers
+        from cylx.cli.batch.workers import Lost, Workers
 
         run = self._silent()
         run = replace(run, threads=run.threads or max(1, cores() // processes))

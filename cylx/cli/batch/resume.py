@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cylx.cli.staging import STREAM
 from cylx.errors import InputError, OutputError
+from cylx.io.outputs import STREAM
 
 if TYPE_CHECKING:
-    from cylx.cli.outputs import Job
+    from cylx.cli.batch.jobs import Job
     from cylx.config import Config
     from cylx.records import Selection
     from cylx.results import Result
@@ -36,9 +36,9 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
     Result or None
         None if the scan has to be done.
     """
-    from cylx import __version__
     from cylx.io import read_json, recorded_name, sha256_of
     from cylx.results import Result
+    from cylx.version import __version__
 
     if STREAM in (job.scan, *job.outputs) or not all(Path(name).is_file() for name in job.written(0)):
         return None
@@ -80,7 +80,7 @@ def is_of_settings(result: Result, settings: Config) -> bool:
 
 def _belong(job: Job, result: Result) -> bool:
     """Say whether what can be told to be of another result, or another unit, is of this one."""
-    from cylx.cli.meshes import mesh_of
+    from cylx.cli.batch.meshes import mesh_of
     from cylx.io import read_json
 
     if job.rejected is not None:

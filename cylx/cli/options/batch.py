@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
-from cylx.cli.memory import cores, memory_available, memory_needed
-from cylx.cli.options import Command, complete_files
-from cylx.cli.outputs import is_folder, is_slashed
-from cylx.cli.summary import LIST, TABLE
+from cylx.cli.batch.jobs import is_folder, is_slashed
+from cylx.cli.batch.memory import cores, memory_available, memory_needed
+from cylx.cli.batch.summary import LIST, TABLE
+from cylx.cli.options.configuration import Command, complete_files
 from cylx.errors import OutputError, UsageError
 
 AUTO = 0

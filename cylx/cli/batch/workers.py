@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection, wait
 from types import FrameType
 from typing import Generic, NamedTuple, NoReturn, TypeVar
 
-from cylx.cli.memory import memory_available, memory_held
+from cylx.cli.batch.memory import memory_available, memory_held
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from cylx.cli.failures import Failures
+from cylx.cli.terminal.failures import Failures
 
 
 class ExampleCommand(click.Command):

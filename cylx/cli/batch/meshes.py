@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.options import Command
+from cylx.cli.options.configuration import Command
 from cylx.errors import UsageError
 
 if TYPE_CHECKING:

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from cylx.cli.failures import BUG, UNUSABLE, describe_failure
-from cylx.cli.stopwatch import peak_memory
-from cylx.cli.summary import legible
+from cylx.cli.batch.summary import legible
+from cylx.cli.terminal.failures import BUG, UNUSABLE, describe_failure
+from cylx.cli.terminal.stopwatch import peak_memory
 from cylx.errors import NothingFoundError
 
 if TYPE_CHECKING:
-    from cylx.cli.extract import Run
-    from cylx.cli.outputs import Job
+    from cylx.cli.batch.jobs import Job
+    from cylx.cli.batch.run import Run
 
 
 @dataclass(frozen=True)

@@ -46,8 +46,8 @@ def table_text(results: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
 
 def list_text(files: Sequence[Mapping[str, object]]) -> str:
     """Write the list of files, each as a JSON object."""
-    from cylx import __version__
-    from cylx.json_parts import text_of
+    from cylx.results.parts import text_of
+    from cylx.version import __version__
 
     return text_of({"schema": SCHEMA, "cylx_version": __version__, "files": list(files)})
 

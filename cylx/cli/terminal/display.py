@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from cylx.cli.failures import answer, tell
+from cylx.cli.terminal.failures import answer, tell
 from cylx.records import Observer, SilentObserver
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress, TaskID
 
-    from cylx.cli.outputs import Job
+    from cylx.cli.batch.jobs import Job
     from cylx.records import CylinderFit, Extraction
 
 _MOST_ROWS = 20

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cylx.cli.staging import STREAM, moved_at_the_end
 from cylx.errors import OutputError, UsageError
+from cylx.io.outputs import STREAM, moved_at_the_end
 
 if TYPE_CHECKING:
     from cylx.records import Extraction, PointCloud
@@ -174,7 +174,7 @@ def _mesh(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
     """Make the mesh that is asked for, and what its reader has to know."""
     if job.mesh is None:
         return None, []
-    from cylx.cli.meshes import mesh_of
+    from cylx.cli.batch.meshes import mesh_of
 
     return mesh_of(job.mesh, content.cylinders, job.units)
 
@@ -208,7 +208,7 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
         if job.annotated is not None:
             write_annotated(staged(job.annotated), extraction, overwrite=overwrite)
         if job.rejected is not None:
-            from cylx.rejections import Rejections
+            from cylx.results import Rejections
 
             write_text(staged(job.rejected), Rejections.of(extraction).to_json(), overwrite=overwrite)
         if job.report is not None:

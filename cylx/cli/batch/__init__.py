@@ -1,0 +1,1 @@
+"""Many scans: which, in which processes, and what became of each."""

@@ -1,0 +1,1 @@
+"""What several commands ask for, one file a kind of option."""
