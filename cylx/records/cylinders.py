@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.catalogue import Choice, Decision
+from cylx.fits.nominal_radius import Choice, Decision
 from cylx.geometry.cylinder import Cylinder
 from cylx.records.clouds import PointCloud, Scene
 from cylx.records.progress import StageReport
@@ -131,7 +131,7 @@ class NominalRadius:
     Parameters
     ----------
     decision : {'snapped', 'ambiguous', 'none'}
-        `snapped` if the cylinder was fitted again with it (see `cylx.catalogue.Choice`).
+        `snapped` if the cylinder was fitted again with it (see `cylx.fits.nominal_radius.Choice`).
     name : str or None
         Of the entry, if it has one.
     nominal_radius : float
