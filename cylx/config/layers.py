@@ -8,9 +8,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cylx.config_catalogue import Given, entries_of
+from cylx.config.catalogue_file import Given, entries_of
+from cylx.config.yaml_reader import parse_yaml
 from cylx.errors import ConfigError
-from cylx.strict_yaml import parse_yaml
 
 _MOST_BYTES = 100_000
 _AXES = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}

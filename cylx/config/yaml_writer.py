@@ -8,7 +8,7 @@ from typing import Any
 
 import yaml
 
-from cylx.config import Config
+from cylx.config.config import Config
 
 _Object = Mapping[str, Any]
 

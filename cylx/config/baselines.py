@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from cylx.config_sections import Number, Positive, Section, Share
+from cylx.config.sections import Number, Positive, Section, Share
 
 Angle = Annotated[Number, Field(gt=0, lt=90)]
 

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from pydantic import ValidationError
 
-from cylx.config_faults import describe_fault
-from cylx.config_sections import CatalogueEntry
+from cylx.config.faults import describe_fault
+from cylx.config.sections import CatalogueEntry
+from cylx.config.yaml_reader import entry_lines, parse_yaml
 from cylx.errors import ConfigError
-from cylx.strict_yaml import entry_lines, parse_yaml
 
 _MOST_BYTES = 100_000
 _SEPARATORS = "\t;,"

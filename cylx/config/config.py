@@ -12,10 +12,10 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import Field, ValidationError, model_validator
 
-from cylx.config_baselines import JinConfig, LineFitConfig, MsacConfig, TranConfig
-from cylx.config_faults import describe_faults
-from cylx.config_layers import Layer, file_layer, merge, nested, override_layer, preset_layer
-from cylx.config_sections import (
+from cylx.config.baselines import JinConfig, LineFitConfig, MsacConfig, TranConfig
+from cylx.config.faults import describe_faults
+from cylx.config.layers import Layer, file_layer, merge, nested, override_layer, preset_layer
+from cylx.config.sections import (
     AveragingConfig,
     CandidatesConfig,
     CatalogueEntry,
