@@ -11,8 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.geometry.morton import BITS, cell_starts, gather_ball
-from cylx.geometry.sorting import sort_in_place
-from cylx.noise.patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
+from cylx.geometry.numerics import sort_in_place
+from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]

@@ -12,14 +12,15 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.catalogue import Catalogue
 from cylx.config import Config
 from cylx.errors import InputError
+from cylx.fits.likelihood import Prior
+from cylx.fits.nominal_radius import Catalogue
 from cylx.geometry.bounding_box import box_of, extent_of, fill_scatter, widest_deviation
-from cylx.geometry.mixture_fit import Prior
 from cylx.geometry.morton import BITS, morton_codes
-from cylx.noise import measure_surface, noise_by_place, noise_by_size
 from cylx.records import Frame, Noise, Scene, cell_keys
+from cylx.scene.noise import measure_surface
+from cylx.scene.noise_variation import noise_by_place, noise_by_size
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
