@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.extent import coordinates_of
+from cylx.geometry.cylinder import coordinates_of
 from cylx.records import Ground, Segment
 
 FloatArray = NDArray[np.float64]

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.measures import SECTORS, Shell, filled_sectors, sector_of
+from cylx.evidence.measures import Shell
+from cylx.geometry.coverage import SECTORS, filled_sectors, sector_of
 
 FloatArray = NDArray[np.float64]
 MaskArray = NDArray[np.bool_]

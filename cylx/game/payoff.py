@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.game import SparsePayoff
+from cylx.game.dynamics import SparsePayoff
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
 
 PIECE = 4096

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.small_matrices import fill_frame
+from cylx.geometry.numerics import fill_frame
 
 FloatArray = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def given_radius(
     model : ndarray of shape (7,)
         A point of the axis, its unit direction, the radius r. Not changed.
     covariance : ndarray of shape (5, 5)
-        C, as `cylx.geometry.mixture_fit.MixtureFit` has it.
+        C, as `cylx.fits.likelihood.MixtureFit` has it.
     radius : float
         R, the unit of the model.
     deviation : float

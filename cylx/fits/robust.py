@@ -15,8 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.simd import FINITE, REORDERED
-from cylx.geometry.small_matrices import fill_frame, solve_in_place
+from cylx.geometry.numerics import FINITE, REORDERED, fill_frame, solve_in_place
 
 FloatArray = NDArray[np.float64]
 

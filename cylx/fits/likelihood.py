@@ -1,6 +1,6 @@
 """Maximum-likelihood fit of a cylinder to points of which a share scatters more widely than the rest.
 
-The residuals are taken for a mixture of two Gaussians (`cylx.geometry.residual_law`), whose shares and widths are
+The residuals are taken for a mixture of two Gaussians (`cylx.fits.residual_law`), whose shares and widths are
 estimated with the cylinder. Gauss-Newton steps solve the normal equations of the points weighted by what either part
 makes of them. So the Cramer-Rao bound is reached, and the covariance is that of an M-estimator (Huber, 1967), which
 stays true where the residuals are no such mixture.
@@ -15,8 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.residual_law import BINS, Law, estimate_law
-from cylx.geometry.small_matrices import fill_frame
+from cylx.fits.residual_law import BINS, Law, estimate_law
+from cylx.geometry.numerics import fill_frame
 
 FloatArray = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Fits of a cylinder to points, and what they say of its uncertainty."""
