@@ -1,0 +1,1 @@
+"""Libraries that may be missing, asked for in one way."""
