@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import InputError
+from cylx.fits.likelihood import fit_mixture
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, unbiased_radius
+from cylx.fits.robust import fit_cylinder as fit_robustly
+from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import Cylinder, axis_frame, canonical_direction, cylinder_coordinates
-from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, unbiased_radius
-from cylx.geometry.cylinder_fit import fit_cylinder as fit_robustly
-from cylx.geometry.mixture_fit import fit_mixture
-from cylx.measures import covered_angle
 from cylx.records import CylinderFit, PointCloud
 from cylx.scene import check_usable
 

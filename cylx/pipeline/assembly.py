@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.cautions import damage
 from cylx.config import Config
-from cylx.geometry.mixture_fit import CONTRADICTION
-from cylx.measures import covered_angle
+from cylx.fits.likelihood import CONTRADICTION
+from cylx.geometry.coverage import covered_angle
 from cylx.records import (
     CylinderFit,
     Extraction,
@@ -22,6 +21,7 @@ from cylx.records import (
     Scene,
     StageReport,
 )
+from cylx.scene.cautions import damage
 from cylx.stages.averaging import inflation
 from cylx.stages.labelling import label_points, surface_points
 

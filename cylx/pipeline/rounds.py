@@ -11,13 +11,13 @@ from itertools import repeat
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.catalogue import Catalogue
 from cylx.config import Config
-from cylx.consensus import Neighbourhood, is_contradicted
-from cylx.geometry.mixture_fit import Prior
-from cylx.pipeline.journal import Journal
-from cylx.pipeline.limits import out_of_range
+from cylx.fits.likelihood import Prior
+from cylx.fits.nominal_radius import Catalogue
+from cylx.game.agreement import Neighbourhood, is_contradicted
+from cylx.pipeline.stage_log import Journal
 from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
+from cylx.scene import out_of_range
 from cylx.stages.averaging import average_cluster, finish, inflation, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.extending import extend

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.geometry.lines import are_along
-from cylx.pipeline.journal import Journal
+from cylx.pipeline.stage_log import Journal
 from cylx.records import Candidates, EllipseFit, Explained, Frame
 from cylx.stages.candidates import polish_candidates, propose_cylinders
 from cylx.stages.curvature import find_curved_windows
