@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
+from cylx.version import __version__
 from pydantic import ConfigDict, Field, JsonValue
 
-from cylx import __version__
-from cylx.json_parts import Input, Part, drop_missing, text_of
-from cylx.results import Measured
+from cylx.results.parts import Input, Part, drop_missing, text_of
+from cylx.results.result import Measured
 
 if TYPE_CHECKING:
     from cylx.records import Extraction, Rejection

@@ -12,25 +12,14 @@ from math import degrees, isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
+from cylx.version import __version__
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
-from cylx import __version__
-from cylx.config_faults import describe_fault
+from cylx.config import describe_fault
 from cylx.errors import InputError
-from cylx.json_parts import (
-    Count,
-    Input,
-    Length,
-    Matrix,
-    Number,
-    Part,
-    Vector,
-    drop_missing,
-    plain_numbers,
-    text_of,
-)
-from cylx.tables import dataframe_of
+from cylx.results.parts import Count, Input, Length, Matrix, Number, Part, Vector, drop_missing, plain_numbers, text_of
+from cylx.results.table import dataframe_of
 
 if TYPE_CHECKING:
     from cylx.records import CylinderFit, Extraction, Scene, StageReport
@@ -295,7 +284,7 @@ class Result(Part):
         return show(self).html
 
     def to_dataframe(self) -> Any:  # noqa: ANN401  pandas is an extra
-        """Give the cylinders as a pandas data frame, its columns those of `cylx.tables.table_of`."""
+        """Give the cylinders as a pandas data frame, its columns those of `cylx.results.table.table_of`."""
         return dataframe_of([cylinder.to_object() for cylinder in self.cylinders])
 
     def to_json(self) -> str:
