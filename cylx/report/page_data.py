@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.config_text import plain_yaml
-from cylx.json_parts import drop_missing
+from cylx.config import plain_yaml
 from cylx.palette import cylinder_colors
-from cylx.rejections import RejectedCylinder
 from cylx.report.maps import MOST_CELLS, unroll
 from cylx.report.points import choose_points, pack_labels, pack_residuals, quantise
-from cylx.report.scenery import Scenery
-from cylx.results import Result
+from cylx.report.view import Scenery
+from cylx.results import RejectedCylinder, Result
+from cylx.results.parts import drop_missing
 
 if TYPE_CHECKING:
     from cylx.records import Extraction

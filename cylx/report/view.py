@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from cylx.errors import UsageError
 from cylx.geometry.cylinder import Cylinder
-from cylx.json_parts import Input
 from cylx.records import Extraction, PointCloud
 from cylx.report.points import original_colors
+from cylx.results.parts import Input
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
