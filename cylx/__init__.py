@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from cylx.errors import CylxError as CylxError
     from cylx.evaluation import compare as compare
     from cylx.evaluation import evaluate as evaluate
-    from cylx.fitting import fit_cylinder as fit_cylinder
     from cylx.geometry.cylinder import Cylinder as Cylinder
     from cylx.io import read_cloud as read_cloud
     from cylx.io import write_annotated as write_annotated
+    from cylx.pipeline.segmented import fit_cylinder as fit_cylinder
     from cylx.records import CylinderFit as CylinderFit
     from cylx.records import Extraction as Extraction
     from cylx.records import PointCloud as PointCloud
@@ -46,7 +46,7 @@ _HOMES = {
     "compare": "cylx.evaluation",
     "evaluate": "cylx.evaluation",
     "extract": "cylx.api",
-    "fit_cylinder": "cylx.fitting",
+    "fit_cylinder": "cylx.pipeline.segmented",
     "load_config": "cylx.config",
     "plot_radii": "cylx.report",
     "plot_residuals": "cylx.report",

@@ -1,7 +1,7 @@
 """`python -m cylx`, and what the command `cylx` calls."""
 
 from cylx.cli import main
-from cylx.cli.kernels import own_process
+from cylx.cli.terminal.startup import own_process
 
 
 def run() -> None:

@@ -7,14 +7,12 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cylx.config import Config, check_tolerance, load_config
-from cylx.config_catalogue import Given
-from cylx.config_layers import named_options
+from cylx.config import Config, Given, check_tolerance, load_config, named_options
 from cylx.io import read_cloud, read_json
 from cylx.pipeline import extract_cylinders
 from cylx.records import Crop, Extraction, Observer, PointCloud, Selection, SilentObserver
 from cylx.results import Result
-from cylx.selection import select
+from cylx.scene import select
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike

@@ -14,8 +14,8 @@ from importlib.metadata import PackageNotFoundError, metadata, version
 from pathlib import Path
 from typing import Literal
 
-from cylx import __version__
 from cylx.records import Observer, SilentObserver
+from cylx.version import __version__
 
 State = Literal["ok", "missing", "broken"]
 
@@ -107,7 +107,7 @@ def check_package(name: str) -> Check:
 
 def check_open3d() -> Check:
     """Check open3d, which reads packed PCD files and gives normals to the methods that need them."""
-    from cylx.open3d_door import import_open3d  # noqa: PLC0415  takes a second
+    from cylx.optional.open3d import import_open3d  # noqa: PLC0415  takes a second
 
     found = _version("open3d-cpu") or _version("open3d")
     return _imported("open3d", import_open3d, found, "pip install --force-reinstall cylx")

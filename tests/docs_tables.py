@@ -16,9 +16,8 @@ from test_architecture import EVERYTHING, MAY_IMPORT
 import cylx
 from cylx.cli import main
 from cylx.config import Config, load_config
-from cylx.config_text import _allowed, _scalar
-from cylx.rejections import rejections_schema
-from cylx.results import result_schema
+from cylx.config.yaml_writer import _allowed, _scalar
+from cylx.results import rejections_schema, result_schema
 
 PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 UNITS = {

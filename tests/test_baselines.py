@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx import api, open3d_door
+from cylx import api
 from cylx.baselines import Limits, msac
 from cylx.baselines.jin import _search_sphere, _straight
 from cylx.baselines.line_fit import fit_line_of_centres
@@ -20,6 +20,7 @@ from cylx.geometry.cylinder import Cylinder
 from cylx.geometry.ellipse import Ellipse
 from cylx.geometry.plane import Plane
 from cylx.io import write_annotated
+from cylx.optional import open3d as open3d_door
 from cylx.records import EllipseFit
 from cylx.results import Result, result_schema
 from cylx.synthetic import single

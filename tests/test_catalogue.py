@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from cylx.catalogue import DECISIVE, MOST, NEAR, Catalogue, choose_entry
+from cylx.fits.nominal_radius import DECISIVE, MOST, NEAR, Catalogue, choose_entry
 
 lengths = st.floats(1e-6, 1e6)
 shares = st.floats(1e-6, 0.5)

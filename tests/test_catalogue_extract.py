@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from cylx.api import extract
-from cylx.catalogue import Catalogue
 from cylx.config import Config
+from cylx.fits.nominal_radius import Catalogue
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import axis_frame
 from cylx.records import Ground, Noise, Segment

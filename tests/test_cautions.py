@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cylx.api import extract
-from cylx.cautions import SAMPLE, cautions, damage, step_of
 from cylx.io import read_cloud
 from cylx.records import PointCloud, Scene
 from cylx.scene import measure_scene
+from cylx.scene.cautions import SAMPLE, cautions, damage, step_of
 from cylx.synthetic import multi, single
 
 SAMPLES = Path(__file__).resolve().parents[1] / "sample_data"

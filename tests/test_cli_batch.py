@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import POINTS
+from cylx.cli.batch.many import Many
 from test_cli_extract import on_a_terminal
 
-from cylx.cli.batch_options import Many, Processes
-from cylx.cli.display import Conversation
-from cylx.cli.memory import memory_available
-from cylx.cli.scans import find_scans
-from cylx.cli.summary import COLUMNS, table_text
+from cylx.cli.batch.memory import memory_available
+from cylx.cli.batch.scans import find_scans
+from cylx.cli.batch.summary import COLUMNS, table_text
+from cylx.cli.options.batch import Processes
+from cylx.cli.terminal.display import Conversation
 from cylx.errors import InputError
 from cylx.io import expected_points, remove_leftovers, temporary_beside
 
@@ -473,8 +474,8 @@ def test_one_scan_is_done_here_whatever_the_jobs(run_cylx, scans, pipeline):
     [(None, 1e9, None), (3, 1e6, 3), (9, 1e9, 4), (0, 0.9e9, 3), (0, 1e5, 1), (0, None, 4)],
 )
 def test_jobs_are_as_many_as_there_is_room_for(monkeypatch, jobs, available, processes):
-    monkeypatch.setattr("cylx.cli.batch_options.memory_available", lambda: available)
-    monkeypatch.setattr("cylx.cli.batch_options.cores", lambda: 8)
+    monkeypatch.setattr("cylx.cli.batch.many.memory_available", lambda: available)
+    monkeypatch.setattr("cylx.cli.batch.many.cores", lambda: 8)
     assert Many(None, False, jobs, False, None).processes(list("abcd")) == processes
     assert Processes().convert("auto", None, None) == 0
 
@@ -500,8 +501,8 @@ def test_jobs_are_as_many_as_there_is_room_for(monkeypatch, jobs, available, pro
 def test_memory_is_what_the_system_and_the_container_leave(tmp_path, monkeypatch, files, available):
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-    monkeypatch.setattr("cylx.cli.memory.MEMINFO", tmp_path / "meminfo")
-    monkeypatch.setattr("cylx.cli.memory.CONTAINER", tmp_path)
+    monkeypatch.setattr("cylx.cli.batch.memory.MEMINFO", tmp_path / "meminfo")
+    monkeypatch.setattr("cylx.cli.batch.memory.CONTAINER", tmp_path)
     assert memory_available() == available
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from cylx import synthetic
-from cylx.cli import memory, workers
-from cylx.cli.workers import Lost, Workers
+from cylx.cli.batch.batch import memory, workers
+from cylx.cli.batch.workers import Lost, Workers
 from cylx.io import temporary_beside, write_cloud
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")

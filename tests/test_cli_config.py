@@ -6,7 +6,7 @@ import jsonschema
 import pytest
 
 from cylx.config import Config, load_config
-from cylx.strict_yaml import parse_yaml
+from cylx.config.yaml_reader import parse_yaml
 
 
 @pytest.mark.parametrize("preset", ["auto", "paper"])
@@ -125,7 +125,7 @@ def test_schema_is_the_one_of_the_result(run_cylx, make_extraction):
 
 
 def test_schema_is_the_one_of_what_was_rejected(run_cylx, make_extraction):
-    from cylx.rejections import Rejections
+    from cylx.results import Rejections
 
     schema = json.loads(run_cylx("config", "schema", "--rejected").stdout)
     content = Rejections.of(make_extraction()).to_object()

@@ -7,8 +7,8 @@ from importlib.metadata import metadata, requires
 
 import pytest
 
-from cylx import diagnosis
-from cylx.diagnosis import Check
+from cylx.cli import doctor as diagnosis
+from cylx.cli.doctor import Check
 
 
 @pytest.fixture

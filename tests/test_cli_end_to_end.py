@@ -14,13 +14,13 @@ from cylx.results import result_schema
 
 STAGES = ["reading", "scene", "curvature", "slicing", "candidates", "clustering", "averaging", "labelling", "writing"]
 INTERRUPT = """
-import cylx.cli.stopwatch, signal, os
-class Interrupted(cylx.cli.stopwatch.Stopwatch):
+import cylx.cli.terminal.stopwatch, signal, os
+class Interrupted(cylx.cli.terminal.stopwatch.Stopwatch):
     def stage_started(self, name, total):
         if name == {stage!r}:
             os.kill(os.getpid(), signal.SIGINT)
         super().stage_started(name, total)
-cylx.cli.stopwatch.Stopwatch = Interrupted
+cylx.cli.terminal.stopwatch.Stopwatch = Interrupted
 """
 
 

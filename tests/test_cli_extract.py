@@ -10,13 +10,12 @@ import pytest
 from plyfile import PlyData
 
 import cylx.io
-from cylx.cli.display import Conversation
-from cylx.cli.options import METHODS
-from cylx.cli.outputs import plan_jobs
+from cylx.cli.batch.jobs import plan_jobs
+from cylx.cli.options.configuration import METHODS
+from cylx.cli.terminal.display import Conversation
 from cylx.config import load_config
 from cylx.errors import InputError, OutputError, UsageError
-from cylx.rejections import rejections_schema
-from cylx.results import result_schema
+from cylx.results import rejections_schema, result_schema
 from cylx.synthetic import single
 
 pytestmark = pytest.mark.usefixtures("fake_pipeline")

@@ -4,7 +4,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from cylx.cli.kernels import BLAS
+from cylx.cli.terminal.startup import BLAS
 
 SAMPLE = Path(__file__).parents[1] / "sample_data" / "room.pcd"
 
@@ -37,7 +37,7 @@ def test_programs_that_import_cylx_keep_matrix_products_in_their_own_kernels():
 
 def test_it_does_nothing_if_numba_is_there_already():
     program = (
-        "import sys, numba.np.arraymath; from cylx.cli.kernels import import_numba_without_blas as start;"
+        "import sys, numba.np.arraymath; from cylx.cli.terminal.startup import import_numba_without_blas as start;"
         f"start(); print(sys.modules.get('{BLAS}', 0) is not None)"
     )
     assert told(program) == "True"

@@ -10,9 +10,9 @@ import pytest
 from click.testing import CliRunner
 
 import cylx
-from cylx.cli import failures
-from cylx.cli.group import LazyGroup
-from cylx.cli.options import debug_option
+from cylx.cli.options.configuration import debug_option
+from cylx.cli.terminal import failures
+from cylx.cli.terminal.group import LazyGroup
 from cylx.errors import BatchError, ConfigError, InputError, NothingFoundError, OutputError, UsageError
 
 COMMANDS = ["extract", "view", "info", "config", "synth", "evaluate", "diff", "export", "doctor", "reproduce"]

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from cylx.cli.outputs import plan_jobs
+from cylx.cli.batch.jobs import plan_jobs
 
 pytestmark = pytest.mark.usefixtures("fake_pipeline")
 

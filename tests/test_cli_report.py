@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import cylx.open3d_door
-from cylx.cli.outputs import plan_jobs
+import cylx.optional.open3d
+from cylx.cli.batch.jobs import plan_jobs
 from cylx.io import read_cloud
 from cylx.palette import cylinder_colors
 
@@ -115,7 +115,7 @@ def result(run_cylx, scan):
 def shown(monkeypatch):
     """What would have been shown in a window."""
     calls = []
-    monkeypatch.setattr(cylx.open3d_door, "show_scene", lambda *args: calls.append(args))
+    monkeypatch.setattr(cylx.optional.open3d, "show_scene", lambda *args: calls.append(args))
     return calls
 
 

@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from cylx.cli.options import METHODS
+from cylx.cli.options.configuration import METHODS
 from cylx.cli.reproduce import NUMBERS
 from cylx.experiments import FIGURES, Key, Outcome, header_line, parse_trials, trial_lines
 from cylx.experiments.figures import METHODS as CURVES

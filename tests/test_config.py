@@ -6,12 +6,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cylx.config import Config, Section, check_tolerance, load_config, preset_names
-from cylx.config_faults import dotted_keys
-from cylx.config_layers import named_options
-from cylx.config_text import commented_yaml, plain_yaml
+from cylx.config import Config, Section, check_tolerance, load_config, named_options, plain_yaml, preset_names
+from cylx.config.faults import dotted_keys
+from cylx.config.yaml_reader import parse_yaml
+from cylx.config.yaml_writer import commented_yaml
 from cylx.errors import ConfigError
-from cylx.strict_yaml import parse_yaml
 
 SECTIONS = [name for name, field in Config.model_fields.items() if isinstance(field.default, Section)]
 KEYS = [key for key in dotted_keys(Config) if key not in SECTIONS]

@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cylx.config import CatalogueEntry, Config, load_config
-from cylx.config_catalogue import read_catalogue
-from cylx.config_layers import named_options
-from cylx.config_text import commented_yaml
+from cylx.config import CatalogueEntry, Config, load_config, named_options
+from cylx.config.catalogue_file import read_catalogue
+from cylx.config.yaml_reader import parse_yaml
+from cylx.config.yaml_writer import commented_yaml
 from cylx.errors import ConfigError
-from cylx.strict_yaml import parse_yaml
 
 DN = [
     {"name": "DN15", "radius": 0.01065, "tolerance": 0.0001},

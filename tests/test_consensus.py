@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.consensus import ALIKE, CONCENTRIC, SAME, WITNESS, Neighbourhood, is_contradicted
+from cylx.game.agreement import ALIKE, CONCENTRIC, SAME, WITNESS, Neighbourhood, is_contradicted
 from cylx.records import Candidates, Segment
 
 seeds = st.integers(0, 2**32 - 1)

@@ -11,11 +11,14 @@ import pytest
 import yaml
 from docs_tables import PACKAGE, TABLES, TOLD, commands, config_keys, config_sections, options_of
 
-from cylx import errors, evidence
+from cylx import errors
 from cylx.config import Config
+from cylx.evidence import weights as evidence
 from cylx.io import annotated
-from cylx.pipeline import limits, sources, turns
+from cylx.pipeline import candidates as sources
+from cylx.pipeline import rounds as turns
 from cylx.records import Scene
+from cylx.scene import priors as limits
 from cylx.scene import resolve
 from cylx.stages import averaging, clustering, curvature, local_slices, verification
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cylx.evidence import TERMS, weigh
+from cylx.evidence.weights import TERMS, weigh
 
 EDGE = dict(  # noqa: C408  keys without quotes read better
     noise_ratio=1.0, lack_of_fit=1.0, structure=0.0, structure_radii=0.0, inside=0.0, outside=0.0, tangent=0.0,

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cylx import evidence
 from cylx.evaluation import evaluate
+from cylx.evidence import weights as evidence
 from cylx.geometry.cylinder import Cylinder, cylinder_coordinates
 from cylx.synthetic import OTHER_SURFACE
 from cylx.synthetic.surfaces import Box, Mantle, Sphere, Wall

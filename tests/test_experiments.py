@@ -32,7 +32,7 @@ from cylx.experiments.figures import METHODS, UNSURE, Cell
 from cylx.experiments.scans import cans_among_clutter, two_cans
 from cylx.experiments.study import bound_of
 from cylx.experiments.trials import config_of
-from cylx.geometry.bounds import mean_errors_at_bound
+from cylx.fits.cramer_rao import mean_errors_at_bound
 from cylx.geometry.cylinder import Cylinder
 from cylx.synthetic import single
 from cylx.synthetic.surfaces import Mantle

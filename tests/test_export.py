@@ -21,7 +21,7 @@ from cylx.export import METRES, draw, format_of, render
 from cylx.export.formats import FORMATS
 from cylx.export.meshes import SIDES, Z_UP
 from cylx.geometry.cylinder import Cylinder
-from cylx.open3d_door import import_open3d
+from cylx.optional.open3d import import_open3d
 from cylx.palette import cylinder_colors
 from cylx.results import ResultCylinder
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from cylx.geometry.bounds import covariance_bound, mean_errors_at_bound, mean_length, outlier_information
+from cylx.fits.cramer_rao import covariance_bound, mean_errors_at_bound, mean_length, outlier_information
 from cylx.geometry.cylinder import axis_frame
 from cylx.synthetic import single
 

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.geometry.conditioning import given_radius
+from cylx.fits.conditioning import given_radius
+from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.geometry.cylinder import axis_frame
-from cylx.geometry.mixture_fit import Prior, fit_mixture
 from cylx.synthetic import single
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.geometry.cylinder_fit import (
+from cylx.fits.robust import (
     SHARP,
     TUKEY,
     TUKEY_SPREAD,

@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.geometry.extent import LEAST, coordinates_of, points_on, visible_extent
+from cylx.geometry.cylinder import coordinates_of, points_on
+from cylx.geometry.extent import LEAST, visible_extent
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=50, deadline=None)

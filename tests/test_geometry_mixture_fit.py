@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from cylx.fits.likelihood import Prior, fit_mixture
+from cylx.fits.residual_law import BINS, Law, estimate_law
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
 from cylx.geometry.cylinder import axis_frame
-from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
-from cylx.geometry.mixture_fit import Prior, fit_mixture
-from cylx.geometry.residual_law import BINS, Law, estimate_law
 
 UNIT = np.array([0.0, 0, 0, 0, 0, 1, 1])
 CHI_5_95, CHI_2_95 = 11.07, 5.991

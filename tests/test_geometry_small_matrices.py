@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.geometry.small_matrices import fill_frame, solve_in_place, symmetric_eigen
+from cylx.geometry.numerics import fill_frame, solve_in_place, symmetric_eigen
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=50, deadline=None)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.geometry.sorting import median_of_positive, sort_in_place
+from cylx.geometry.numerics import median_of_positive, sort_in_place
 
 numbers = st.floats(allow_nan=False, width=64) | st.sampled_from([0.0, 1.0, -1.0, np.inf, -np.inf])
 lists = st.lists(numbers, max_size=40)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.geometry.vectors import cross
+from cylx.geometry.numerics import cross
 
 SHAPES = [
     ((3,), (3,)),

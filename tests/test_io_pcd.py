@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 
 from cylx.errors import InputError
 from cylx.io import read_cloud, write_cloud
-from cylx.open3d_door import import_open3d
+from cylx.optional.open3d import import_open3d
 
 MUG = Path(__file__).resolve().parents[2] / "shared" / "data" / "pcl" / "table_scene_mug_stereo_textured.pcd"
 BODIES = ["ascii", "binary", "binary_compressed"]

@@ -7,11 +7,10 @@ from hypothesis import strategies as st
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
-from cylx.noise import noise_by_place
-from cylx.noise.variation import AGREED
 from cylx.records import Ground, Noise
 from cylx.records.clouds import ENOUGH_PATCHES, MOST_NOISE, cell_keys
-from cylx.scene import make_frame
+from cylx.scene import make_frame, noise_by_place
+from cylx.scene.noise_variation import AGREED
 from cylx.synthetic import single
 
 seeds = st.integers(0, 2**32 - 1)

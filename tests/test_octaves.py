@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx.config import Config
-from cylx.geometry.cylinder_fit import Kernel, fit_cylinder
+from cylx.fits.robust import Kernel, fit_cylinder
 from cylx.geometry.morton import gather_ball
 from cylx.records import Octave
 from cylx.scene import make_frame

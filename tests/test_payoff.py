@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from cylx.game import local_payoff, screw_payoff
+from cylx.game.payoff import CUT, REACH
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
-from cylx.payoff import CUT, REACH, local_payoff, screw_payoff
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=40, deadline=None)
@@ -234,7 +235,7 @@ def test_threads_and_pieces_make_no_difference(monkeypatch, seed, piece):
     widths = 0.1, 0.3, 0.15, 0.7
     whole = local_payoff(models, parents, extents, *widths)
     assert len(whole.values) > 2000
-    monkeypatch.setattr("cylx.payoff.PIECE", piece)
+    monkeypatch.setattr("cylx.game.payoff.PIECE", piece)
     one = local_payoff(models, parents, extents, *widths)
     assert_same_rows(one, whole, 400)
     for threads in (2, 5):

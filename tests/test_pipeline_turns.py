@@ -8,7 +8,7 @@ import pytest
 from cylx.config import Config
 from cylx.geometry.cylinder import Cylinder
 from cylx.pipeline import extract_cylinders
-from cylx.pipeline.turns import ROUND
+from cylx.pipeline.rounds import ROUND
 from cylx.records import PointCloud
 from cylx.results import Result
 from cylx.synthetic import multi
@@ -56,7 +56,7 @@ def test_rounds_in_threads_give_the_same_bytes(pipes, threads):
 def test_the_size_of_a_round_is_no_matter_for_what_is_found(pipes, monkeypatch):
     scene, found = pipes
     assert ROUND > 1
-    monkeypatch.setattr("cylx.pipeline.turns.ROUND", 1)
+    monkeypatch.setattr("cylx.pipeline.rounds.ROUND", 1)
     other = run(scene.points)
     assert len(other.cylinders) == len(found.cylinders)
     for fit in found.cylinders:

@@ -12,8 +12,7 @@ from cylx.config import load_config
 from cylx.geometry.cylinder import cylinder_coordinates, surface_distances
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud
-from cylx.rejections import Rejections, rejections_schema
-from cylx.results import Result, result_schema
+from cylx.results import Rejections, Result, rejections_schema, result_schema
 from cylx.synthetic import multi
 
 SAME_AGAIN = {"found before", "joined"}

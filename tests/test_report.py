@@ -20,9 +20,9 @@ from cylx.geometry.cylinder import Cylinder, axis_frame
 from cylx.palette import cylinder_colors
 from cylx.records import PointCloud, Source
 from cylx.report import html_of, png_of
-from cylx.report.facts import facts_of
 from cylx.report.maps import EMPTY, unroll
 from cylx.report.page import json_for_script
+from cylx.report.page_data import facts_of
 from cylx.report.picture import outline
 from cylx.report.points import LEAST, STEPS, choose_points, original_colors, pack_labels, pack_residuals, quantise
 from cylx.results import Result

@@ -10,7 +10,6 @@ from cylx.config import Config, load_config
 from cylx.errors import InputError
 from cylx.geometry.cylinder import Cylinder
 from cylx.geometry.morton import morton_codes
-from cylx.noise.patches import half_sample_mode
 from cylx.records import Noise
 from cylx.scene import (
     canonical_order,
@@ -22,6 +21,7 @@ from cylx.scene import (
     radius_range,
     resolve,
 )
+from cylx.scene.noise_patches import half_sample_mode
 from cylx.synthetic import multi, single
 
 UTM = np.array([512345.678, 5412345.432, 123.4])

@@ -8,7 +8,8 @@ from hypothesis.extra.numpy import arrays
 
 from cylx.errors import InputError
 from cylx.records import PointCloud, Selection, Source
-from cylx.selection import inside_box, one_a_voxel, select
+from cylx.scene import select
+from cylx.scene.selection import inside_box, one_a_voxel
 
 clouds = arrays(
     np.float64, st.tuples(st.integers(1, 40), st.just(3)), elements=st.integers(-20, 20).map(lambda n: n / 8)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx.config import ClusteringConfig, load_config
-from cylx.consensus import Neighbourhood
+from cylx.game.agreement import Neighbourhood
 from cylx.records import Candidates, Segment
 from cylx.stages.clustering import CandidateGame, thin_candidates
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from cylx.baselines.proposal import Proposal
 from cylx.config import LineFitConfig
+from cylx.fits.robust import Kernel, fit_cylinder
 from cylx.geometry.cylinder import canonical_direction, cylinder_coordinates
-from cylx.geometry.cylinder_fit import Kernel, fit_cylinder
 from cylx.records import EllipseFit, Frame
 
 FloatArray = NDArray[np.float64]

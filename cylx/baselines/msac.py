@@ -24,8 +24,8 @@ from cylx.baselines.limits import Limits
 from cylx.baselines.normals import normals_for
 from cylx.baselines.proposal import Proposal
 from cylx.config import MsacConfig
+from cylx.fits.robust import Kernel, fit_cylinder
 from cylx.geometry.cylinder import cylinder_coordinates
-from cylx.geometry.cylinder_fit import Kernel, fit_cylinder
 from cylx.records import Frame
 
 FloatArray = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import ConfigError
-from cylx.open3d_door import estimate_normals
+from cylx.optional.open3d import estimate_normals
 
 FloatArray = NDArray[np.float64]
 

@@ -30,8 +30,8 @@ from cylx.baselines.proposal import Proposal
 from cylx.config import TranConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.circle import fit_circle
+from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import axis_frame, canonical_direction, cylinder_coordinates
-from cylx.measures import covered_angle
 from cylx.records import Frame
 
 FloatArray = NDArray[np.float64]

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import click
 
-from cylx import __version__
-from cylx.cli.group import LazyGroup
-from cylx.cli.options import debug_option
+from cylx.cli.options.configuration import debug_option
+from cylx.cli.terminal.group import LazyGroup
+from cylx.version import __version__
 
 
 @click.group(

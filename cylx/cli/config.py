@@ -9,10 +9,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.failures import answer
-from cylx.cli.group import ExampleGroup
-from cylx.cli.options import PRESETS, complete_files, configured, debug_option, json_option, overwrite_option
-from cylx.cli.summary import legible
+from cylx.cli.batch.summary import legible
+from cylx.cli.options.configuration import (
+    PRESETS,
+    complete_files,
+    configured,
+    debug_option,
+    json_option,
+    overwrite_option,
+)
+from cylx.cli.terminal.failures import answer
+from cylx.cli.terminal.group import ExampleGroup
 from cylx.errors import ConfigError, UsageError
 
 if TYPE_CHECKING:
@@ -36,7 +43,7 @@ def init(*, file: str, preset: str, overwrite: bool) -> None:
     'cylx extract -c FILE'.
     """
     from cylx.config import load_config
-    from cylx.config_text import commented_yaml
+    from cylx.config.yaml_writer import commented_yaml
     from cylx.io import write_text
 
     write_text(file, commented_yaml(load_config(preset=preset)), overwrite=overwrite)
@@ -51,7 +58,7 @@ def show(*, settings: Config, as_json: bool) -> None:
 
     What is null is read off the cloud; the JSON that 'cylx extract' writes has the values.
     """
-    from cylx.config_text import plain_yaml
+    from cylx.config import plain_yaml
 
     answer(json.dumps(settings.model_dump(mode="json"), indent=2) + "\n" if as_json else plain_yaml(settings))
 
@@ -105,7 +112,7 @@ def schema(*, result: bool, rejected: bool) -> None:
     if result and rejected:
         raise UsageError("--rejected", "contradicts --result", "leave one of them out")
     if rejected:
-        from cylx.rejections import rejections_schema
+        from cylx.results import rejections_schema
 
         document = rejections_schema()
     elif result:

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.documents import called_by_file
-from cylx.cli.failures import answer
-from cylx.cli.group import ExampleCommand
-from cylx.cli.options import complete_files, debug_option, json_option
+from cylx.cli.options.configuration import complete_files, debug_option, json_option
+from cylx.cli.terminal.failures import answer, called_by_file
+from cylx.cli.terminal.group import ExampleCommand
 
 if TYPE_CHECKING:
     from cylx.evaluation import Difference
@@ -42,7 +41,7 @@ def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
     The order of the cylinders does not matter. The exit code is 0 if they are the same and 1 if not; what differs is
     shown.
     """
-    from cylx.cli.display import show_table
+    from cylx.cli.terminal.display import show_table
     from cylx.evaluation import Tolerances, compare
     from cylx.io import read_json
 

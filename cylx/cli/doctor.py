@@ -7,9 +7,9 @@ from dataclasses import asdict
 
 import click
 
-from cylx.cli.failures import answer
-from cylx.cli.group import ExampleCommand
-from cylx.cli.options import debug_option, json_option
+from cylx.cli.options.configuration import debug_option, json_option
+from cylx.cli.terminal.failures import answer
+from cylx.cli.terminal.group import ExampleCommand
 
 
 @click.command(
@@ -23,8 +23,8 @@ def doctor(*, as_json: bool) -> None:
     Libraries, compiled kernels, memory, and the extraction of a cylinder that is made up. The exit code is 0 if
     cylinders can be found and 1 if not; optional libraries that are missing are no fault. Nothing is fetched.
     """
-    from cylx.cli.display import Conversation, show_table
-    from cylx.diagnosis import diagnose
+    from cylx.cli.doctor import diagnose
+    from cylx.cli.terminal.display import Conversation, show_table
 
     with Conversation().progress() as observer:
         checks = diagnose(observer)

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.documents import called_by_file
-from cylx.cli.failures import answer, tell
-from cylx.cli.group import ExampleCommand
-from cylx.cli.options import complete_files, debug_option, json_option
+from cylx.cli.options.configuration import complete_files, debug_option, json_option
+from cylx.cli.terminal.failures import answer, called_by_file, tell
+from cylx.cli.terminal.group import ExampleCommand
 
 if TYPE_CHECKING:
     from cylx.evaluation import Evaluation

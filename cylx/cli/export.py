@@ -7,14 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.failures import answer, tell
-from cylx.cli.group import ExampleCommand
-from cylx.cli.meshes import drawing_of, remarks_on, units_option
-from cylx.cli.options import complete_files, debug_option, json_option, overwrite_option
-from cylx.cli.outputs import check_apart
-from cylx.cli.staging import write_together
-from cylx.cli.summary import legible
+from cylx.cli.batch.jobs import check_apart
+from cylx.cli.batch.meshes import drawing_of, remarks_on
+from cylx.cli.batch.summary import legible
+from cylx.cli.options.configuration import complete_files, debug_option, json_option, overwrite_option
+from cylx.cli.options.units import units_option
+from cylx.cli.terminal.failures import answer, tell
+from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import InputError
+from cylx.io.outputs import write_together
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

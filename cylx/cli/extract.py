@@ -8,18 +8,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.batch_options import Many, made_folder, with_many
-from cylx.cli.group import ExampleCommand
-from cylx.cli.meshes import check_meshes, units_option
-from cylx.cli.options import complete_files, configured, debug_option, overwrite_option, talking
-from cylx.cli.outputs import Job, check_apart, check_format, check_outputs, plan_jobs, write_job
-from cylx.cli.selecting import selecting
-from cylx.cli.stopwatch import Stopwatch
+from cylx.cli.batch.jobs import Job, check_apart, check_format, check_outputs, plan_jobs, write_job
+from cylx.cli.batch.many import Many, made_folder
+from cylx.cli.batch.meshes import check_meshes
+from cylx.cli.options.batch import with_many
+from cylx.cli.options.configuration import complete_files, configured, debug_option, overwrite_option, talking
+from cylx.cli.options.selection import selecting
+from cylx.cli.options.units import units_option
+from cylx.cli.terminal.group import ExampleCommand
+from cylx.cli.terminal.stopwatch import Stopwatch
 
 if TYPE_CHECKING:
-    from cylx.cli.batch import Batch
-    from cylx.cli.display import Conversation
-    from cylx.cli.outcomes import Finished
+    from cylx.cli.batch.batch import Batch
+    from cylx.cli.batch.outcomes import Finished
+    from cylx.cli.terminal.display import Conversation
     from cylx.config import Config
     from cylx.records import Selection
 
@@ -114,8 +116,8 @@ def extract(
     each point; with --report FILE a page to look at, too. Nothing has to be tuned: spacing, noise and radii are read
     off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
     """
-    from cylx.cli.batch import Batch
-    from cylx.cli.scans import find_scans
+    from cylx.cli.batch.batch import Batch
+    from cylx.cli.batch.scans import find_scans
 
     output = many.output(output)
     found = find_scans(scans, recursive=many.recursive)
@@ -177,15 +179,15 @@ class Run:
         OutputError
             If the outputs cannot be written.
         """
-        from cylx.cli.display import Observers, observed
-        from cylx.cli.kernels import collect_rarely, import_numba_without_blas
-        from cylx.cli.outcomes import Finished
+        from cylx.cli.batch.outcomes import Finished
+        from cylx.cli.terminal.display import Observers, observed
+        from cylx.cli.terminal.startup import collect_rarely, import_numba_without_blas
 
         collect_rarely()
         import_numba_without_blas()
         from cylx.io import read_cloud
         from cylx.pipeline import extract_cylinders
-        from cylx.selection import select
+        from cylx.scene import select
 
         stopwatch = Stopwatch(job.scan)
         with self.talk.progress() as display:
@@ -206,8 +208,8 @@ class Run:
 
 def write_profile(path: str, batch: Batch, *, overwrite: bool) -> None:
     """Write the times of all scans that were finished."""
-    from cylx import __version__
     from cylx.io import write_text
+    from cylx.version import __version__
 
     profile = {"cylx_version": __version__, "inputs": batch.profiles, "peak_memory_bytes": batch.peak}
     write_text(path, json.dumps(profile, indent=2) + "\n", overwrite=overwrite)

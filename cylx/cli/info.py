@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.failures import answer, tell
-from cylx.cli.group import ExampleCommand
-from cylx.cli.memory import memory_available, memory_for
-from cylx.cli.options import complete_files, debug_option, json_option
-from cylx.cli.selecting import selecting
+from cylx.cli.batch.memory import memory_available, memory_for
+from cylx.cli.options.configuration import complete_files, debug_option, json_option
+from cylx.cli.options.selection import selecting
+from cylx.cli.terminal.failures import answer, tell
+from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import InputError
 
 if TYPE_CHECKING:
-    from cylx.cautions import Caution
     from cylx.records import PointCloud, Selection
+    from cylx.scene.cautions import Caution
 
 
 @click.command(cls=ExampleCommand, examples=["cylx info scan.ply", "cylx info scan.ply --json | jq .scene.spacing"])
@@ -36,7 +36,7 @@ def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
     only some points take part, all that is theirs. What will go wrong is said in a line each on standard error.
     """
     from cylx.io import read_cloud
-    from cylx.selection import select
+    from cylx.scene import select
 
     whole = read_cloud(scan, scan=selection.scan)
     cloud = select(whole, selection)
@@ -45,7 +45,7 @@ def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
         prospects, found = look_ahead(whole, cloud, seed)
         facts.update(prospects)
     except InputError as failure:
-        from cylx.cautions import Caution
+        from cylx.scene.cautions import Caution
 
         found = [Caution("unusable", failure.fault, "cylinders cannot be looked for in it")]
     found += _scarce_memory(facts["extract_memory_bytes"])
@@ -78,9 +78,9 @@ def look_ahead(whole: PointCloud, cloud: PointCloud, seed: int) -> tuple[dict[st
     InputError
         If no cylinder could be told from anything else in it.
     """
-    from cylx.cautions import cautions
     from cylx.config import load_config
     from cylx.scene import check_usable, measure_scene, resolve, thinnest
+    from cylx.scene.cautions import cautions
 
     check_usable(cloud.points, cloud.source.file)
     scene = measure_scene(cloud.points, seed)
@@ -95,7 +95,7 @@ def look_ahead(whole: PointCloud, cloud: PointCloud, seed: int) -> tuple[dict[st
 
 def _scarce_memory(needed: int) -> list[Caution]:
     """Notice that the extraction may not fit into the memory that is free now."""
-    from cylx.cautions import Caution
+    from cylx.scene.cautions import Caution
 
     available = memory_available()
     if available is None or needed <= available:

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx import __version__
-from cylx.cli.failures import answer
-from cylx.cli.group import ExampleCommand
-from cylx.cli.options import complete_files, debug_option, json_option, talking
+from cylx.cli.options.configuration import complete_files, debug_option, json_option, talking
+from cylx.cli.terminal.failures import answer
+from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import OutputError, UsageError
+from cylx.version import __version__
 
 if TYPE_CHECKING:
-    from cylx.cli.display import Conversation
+    from cylx.cli.terminal.display import Conversation
     from cylx.experiments import Figure, ObjectScan, Summary, Trials
 
 NUMBERS = tuple(str(number) for number in range(5, 13))
@@ -139,7 +139,7 @@ class Study:
         UsageError
             If matplotlib is not installed.
         """
-        from cylx.cli.display import observed
+        from cylx.cli.terminal.display import observed
         from cylx.experiments import draw, run_tasks, summarize, tasks_of
         from cylx.io import check_writable, write_bytes
 
@@ -231,7 +231,7 @@ def _number(value: float) -> float | None:
 
 def _show(figure: Figure, summaries: list[Summary]) -> None:
     """Show the means, and how many times the bound they are."""
-    from cylx.cli.display import show_table
+    from cylx.cli.terminal.display import show_table
 
     errors = figure.kind in {"cylinder", "cans"}
     shown = {"cylinder": (0, 1, 2), "cans": (0,)}.get(figure.kind, (3,))

@@ -9,11 +9,19 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 import click
 
-from cylx.cli.failures import answer
-from cylx.cli.group import ExampleGroup
-from cylx.cli.options import Bounds, RadiusRange, Vector, complete_files, debug_option, json_option, overwrite_option
-from cylx.cli.outputs import TRUTH, check_apart
-from cylx.cli.summary import legible
+from cylx.cli.batch.jobs import TRUTH, check_apart
+from cylx.cli.batch.summary import legible
+from cylx.cli.options.configuration import (
+    Bounds,
+    RadiusRange,
+    Vector,
+    complete_files,
+    debug_option,
+    json_option,
+    overwrite_option,
+)
+from cylx.cli.terminal.failures import answer
+from cylx.cli.terminal.group import ExampleGroup
 from cylx.errors import UsageError
 
 if TYPE_CHECKING:

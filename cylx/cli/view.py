@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.group import ExampleCommand
-from cylx.cli.options import complete_files, debug_option
-from cylx.cli.outputs import ANNOTATED, RESULT
-from cylx.cli.staging import STREAM
+from cylx.cli.batch.jobs import ANNOTATED, RESULT
+from cylx.cli.options.configuration import complete_files, debug_option
+from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import InputError, UsageError
+from cylx.io.outputs import STREAM
 
 if TYPE_CHECKING:
     import numpy as np
@@ -41,7 +41,7 @@ def view(*, result: str, cloud: str | None) -> None:
     'cylx extract --report' writes a page that any browser shows.
     """
     from cylx.io import read_cloud, read_json
-    from cylx.open3d_door import NoDisplayError, show_scene
+    from cylx.optional.open3d import NoDisplayError, show_scene
     from cylx.palette import cylinder_colors
     from cylx.results import Result
 

@@ -10,7 +10,7 @@ import numpy as np
 from cylx.experiments.figures import UNSURE, Figure
 from cylx.experiments.study import QUANTITIES, Summary
 from cylx.experiments.table import Trials
-from cylx.matplotlib_door import new_figure
+from cylx.optional.matplotlib import new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.open3d_door import estimate_normals
+from cylx.optional.open3d import estimate_normals
 
 FloatArray = NDArray[np.float64]
 FaceArray = NDArray[np.int64]

@@ -17,7 +17,7 @@ from cylx.experiments.figures import Cell, Figure
 from cylx.experiments.scans import ObjectScan
 from cylx.experiments.table import Key, Trials
 from cylx.experiments.trials import Outcome, run_trial
-from cylx.geometry.bounds import mean_errors_at_bound
+from cylx.fits.cramer_rao import mean_errors_at_bound
 
 FloatArray = NDArray[np.float64]
 

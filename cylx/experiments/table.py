@@ -7,9 +7,9 @@ import io
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from cylx import __version__
 from cylx.experiments.figures import Cell
 from cylx.experiments.trials import Outcome
+from cylx.version import __version__
 
 COLUMNS = ("panel", "curve", "x", "trial", "found", "angle_deg", "offset", "radius_percent", "seconds", "made_by")
 

@@ -6,7 +6,7 @@ import csv
 import io
 
 from cylx.export.drawing import Drawing, Exported
-from cylx.tables import table_of
+from cylx.results.table import table_of
 
 
 def write(drawing: Drawing, suffix: str) -> Exported:

@@ -6,10 +6,10 @@ import hashlib
 import uuid
 from typing import Any
 
-from cylx import __version__
 from cylx.export.drawing import Drawing, Exported, Piece
 from cylx.export.formats import METRES
 from cylx.geometry.cylinder import axis_frame
+from cylx.version import __version__
 
 _PREFIXES = {"m": None, "mm": "MILLI", "cm": "CENTI"}
 _NAMES = {"in": "INCH", "ft": "FOOT"}

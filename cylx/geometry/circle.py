@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.simd import REORDERED
-from cylx.geometry.small_matrices import solve_in_place
+from cylx.geometry.numerics import REORDERED, solve_in_place
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cylx.geometry.vectors import cross
+from cylx.geometry.numerics import cross
 
 FloatArray = NDArray[np.float64]
 

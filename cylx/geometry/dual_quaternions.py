@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.geometry.lines import common_perpendicular
-from cylx.geometry.vectors import cross
+from cylx.geometry.numerics import cross
 
 FloatArray = NDArray[np.float64]
 

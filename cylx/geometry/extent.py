@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.small_matrices import fill_frame
-from cylx.geometry.sorting import median_of_positive, sort_in_place
+from cylx.geometry.numerics import fill_frame, median_of_positive, sort_in_place
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]

@@ -8,8 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from cylx.geometry.small_matrices import symmetric_eigen
-from cylx.geometry.vectors import cross
+from cylx.geometry.numerics import cross, symmetric_eigen
 
 FloatArray = NDArray[np.float64]
 

@@ -13,8 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.simd import REORDERED
-from cylx.geometry.small_matrices import fill_frame, solve_in_place, symmetric_eigen
+from cylx.geometry.numerics import REORDERED, fill_frame, solve_in_place, symmetric_eigen
 
 FloatArray = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.extras import require_extra
 from cylx.io.names import mended_names
+from cylx.optional.extras import require_extra
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.extras import require_extra
 from cylx.io.las_header import LasFacts, las_header
 from cylx.io.names import mended_names
 from cylx.io.rows import short_of_points
+from cylx.optional.extras import require_extra
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

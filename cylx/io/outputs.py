@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from cylx.errors import OutputError
 from cylx.io.inputs import printable
-from cylx.io.temporary import temporary_beside
+from cylx.io.outputs import temporary_beside
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

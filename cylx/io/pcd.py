@@ -15,7 +15,7 @@ from cylx.errors import InputError
 from cylx.io.inputs import Input, excerpt
 from cylx.io.names import coordinate_names, mended_names, missing_coordinates
 from cylx.io.rows import RowFormat, read_rows, short_of_points
-from cylx.open3d_door import unpack_columns
+from cylx.optional.open3d import unpack_columns
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
-from cylx.pipeline.conclusion import conclude
-from cylx.pipeline.journal import Journal
-from cylx.pipeline.sources import (
+from cylx.pipeline.assembly import conclude
+from cylx.pipeline.candidates import (
     candidates_along_axis,
     candidates_of_slices,
     candidates_of_windows,
     ellipses_of_slices,
     windows_and_explained,
 )
-from cylx.pipeline.turns import Turns
+from cylx.pipeline.rounds import Turns
+from cylx.pipeline.stage_log import Journal
 from cylx.pipeline.warmup import kernels_are_cold, practice_cloud, second_process
 from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
 from cylx.scene import catalogue_of, check_usable, known_of, make_frame, radius_range, resolve

@@ -12,13 +12,12 @@ import numpy as np
 from cylx.baselines import Limits, Proposal, find_by_consensus, find_by_growing, find_by_spheres, fit_line_of_centres
 from cylx.config import Config
 from cylx.geometry.cells import Cells
-from cylx.measures import covered_angle
-from cylx.pipeline.conclusion import conclude
-from cylx.pipeline.journal import Journal
-from cylx.pipeline.limits import out_of_range
-from cylx.pipeline.sources import ellipses_of_slices
+from cylx.geometry.coverage import covered_angle
+from cylx.pipeline.assembly import conclude
+from cylx.pipeline.candidates import ellipses_of_slices
+from cylx.pipeline.stage_log import Journal
 from cylx.records import Extraction, Finding, Frame, Ground, PointCloud, Refusal
-from cylx.scene import make_frame, radius_range, resolve
+from cylx.scene import make_frame, out_of_range, radius_range, resolve
 from cylx.stages.averaging import measure_extent
 from cylx.stages.labelling import surface_points
 

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.geometry.morton import find_cell, morton_codes
-from cylx.pipeline.conclusion import conclude
-from cylx.pipeline.journal import Journal
-from cylx.pipeline.sources import candidates_of_windows
-from cylx.pipeline.turns import Turns
+from cylx.pipeline.assembly import conclude
+from cylx.pipeline.candidates import candidates_of_windows
+from cylx.pipeline.rounds import Turns
+from cylx.pipeline.stage_log import Journal
 from cylx.records import Candidates, Explained, Frame, Ground, Noise, PointCloud, Scene, SilentObserver
 from cylx.scene import resolve
 from cylx.stages.clustering import CandidateGame

@@ -4,11 +4,11 @@ Many things of one kind travel as a structure of arrays (`Candidates`); the few 
 one. All records are frozen: a stage makes new ones and never changes those it was given.
 """
 
+from cylx.records.candidates import Candidates, Cluster, EllipseFit, Slice
 from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, cell_keys
-from cylx.records.hypotheses import Candidates, Cluster, EllipseFit, Slice
-from cylx.records.octaves import CELL, Explained, Octave
-from cylx.records.outcomes import CylinderFit, Extraction, Finding, NominalRadius, Refusal, Rejection, Segment
+from cylx.records.cylinders import CylinderFit, Extraction, Finding, NominalRadius, Refusal, Rejection, Segment
 from cylx.records.progress import Observer, SilentObserver, StageReport
+from cylx.records.scales import CELL, Explained, Octave
 from cylx.records.sources import Crop, Selection, Source
 
 __all__ = [

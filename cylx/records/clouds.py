@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from cylx.geometry.bounding_box import extent_of
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
-from cylx.geometry.sorting import sort_in_place
+from cylx.geometry.numerics import sort_in_place
 from cylx.records.sources import ARRAY, Source
 
 FloatArray = NDArray[np.float64]

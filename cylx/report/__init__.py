@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cylx.matplotlib_door import check_pictures
+from cylx.optional.matplotlib import check_pictures
 from cylx.report.notebook import NotebookView, show
 from cylx.report.page import html_of
 from cylx.report.picture import plot_scene, png_of

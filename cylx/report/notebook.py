@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cylx.palette import cylinder_colors
-from cylx.report.facts import maps_of, view_of
 from cylx.report.page import page_of
+from cylx.report.page_data import maps_of, view_of
 from cylx.report.plots import with_deviation
-from cylx.report.scenery import Scenery
+from cylx.report.view import Scenery
 from cylx.results import Result
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import re
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from cylx.report.facts import facts_of
+from cylx.report.page_data import facts_of
 
 if TYPE_CHECKING:
     from cylx.records import Extraction

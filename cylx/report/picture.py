@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.geometry.cylinder import Cylinder, axis_frame
-from cylx.matplotlib_door import new_figure
+from cylx.optional.matplotlib import new_figure
 from cylx.palette import cylinder_colors
 from cylx.report.points import choose_points
-from cylx.report.scenery import Scenery
+from cylx.report.view import Scenery
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

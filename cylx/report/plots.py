@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import UsageError
-from cylx.matplotlib_door import new_figure
+from cylx.optional.matplotlib import new_figure
 from cylx.palette import cylinder_colors
 from cylx.records import Extraction
 from cylx.report.maps import EMPTY, unroll
-from cylx.report.scenery import Scenery
+from cylx.report.view import Scenery
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -141,7 +141,7 @@ const ROOM = 1.02; // the ball that is looked at first is larger than what is in
 const SLOW = 70; // milliseconds a frame, from which on fewer points are drawn while something moves
 
 class Viewer {
-  /** @param canvas where to draw; @param view what: see `cylx/report/facts.py`. */
+  /** @param canvas where to draw; @param view what: see `cylx/report/page_data.py`. */
   constructor(canvas, view) {
     this.canvas = canvas;
     this.view = view;

@@ -14,14 +14,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.catalogue import Catalogue, choose_entry
 from cylx.config import AveragingConfig
-from cylx.geometry.conditioning import given_radius
-from cylx.geometry.cylinder import cylinder_coordinates
-from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
+from cylx.fits.conditioning import given_radius
+from cylx.fits.likelihood import Prior, fit_mixture
+from cylx.fits.nominal_radius import Catalogue, choose_entry
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
+from cylx.geometry.cylinder import cylinder_coordinates, points_on
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
-from cylx.geometry.extent import points_on, visible_extent
-from cylx.geometry.mixture_fit import Prior, fit_mixture
+from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, Ground, Segment
 
 FloatArray = NDArray[np.float64]

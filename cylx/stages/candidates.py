@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
-from cylx.geometry.cylinder_fit import move_to_foot, polish
+from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
 

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import ClusteringConfig
-from cylx.consensus import Neighbourhood
-from cylx.game import SparsePayoff, evolve
-from cylx.payoff import local_payoff, screw_payoff
+from cylx.game import SparsePayoff, evolve, local_payoff, screw_payoff
+from cylx.game.agreement import Neighbourhood
 from cylx.records import Candidates, Cluster, Segment, StageReport
 
 FloatArray = NDArray[np.float64]

@@ -15,10 +15,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
-from cylx.geometry.cylinder_fit import move_to_foot, polish
+from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball
+from cylx.geometry.numerics import fill_frame
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
-from cylx.geometry.small_matrices import fill_frame
 from cylx.records import CELL, Candidates, Explained, Frame, Octave, StageReport
 
 FloatArray = NDArray[np.float64]

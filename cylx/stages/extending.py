@@ -13,8 +13,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.cylinder_fit import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
-from cylx.geometry.extent import coordinates_of
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
+from cylx.geometry.cylinder import coordinates_of
 from cylx.records import Finding, Ground, Segment
 
 FloatArray = NDArray[np.float64]

@@ -15,12 +15,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import SlicingConfig
+from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.circle import search_circle
-from cylx.geometry.cylinder_fit import move_to_foot, polish
 from cylx.geometry.ellipse import conic_shape, search_conic
 from cylx.geometry.lines import fit_line, off_line
 from cylx.geometry.morton import gather_ball
-from cylx.geometry.small_matrices import fill_frame
+from cylx.geometry.numerics import fill_frame
 from cylx.records import Candidates, Explained, Frame, Octave
 
 FloatArray = NDArray[np.float64]

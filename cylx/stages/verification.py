@@ -13,17 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import VerificationConfig
-from cylx.evidence import weigh
-from cylx.measures import (
-    TRUNCATED,
-    covered_angle,
-    distinct_places,
-    lack_of_fit,
-    look_at,
-    shape_of,
-)
+from cylx.evidence.measures import TRUNCATED, distinct_places, lack_of_fit, look_at, shape_of
+from cylx.evidence.surroundings import continuation, emptiness, flank
+from cylx.evidence.weights import weigh
+from cylx.geometry.coverage import covered_angle
 from cylx.records import Ground, Segment
-from cylx.surroundings import continuation, emptiness, flank
 
 LEAST = 20
 """Points on the surface without which nothing can be measured."""

@@ -19,7 +19,7 @@ from single import errors_of
 from tables import Bars, print_header, print_row
 
 from cylx.config import Config
-from cylx.geometry.bounds import covariance_bound, mean_length, outlier_information
+from cylx.fits.cramer_rao import covariance_bound, mean_length, outlier_information
 from cylx.geometry.cylinder import Cylinder, axis_frame
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud

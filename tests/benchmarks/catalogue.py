@@ -14,8 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from tables import Bars, print_header, print_row
 
-from cylx.config import Config, load_config
-from cylx.config_layers import named_options
+from cylx.config import Config, load_config, named_options
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud
 from cylx.synthetic import single

@@ -16,8 +16,8 @@ from single import errors_of
 from tables import Bars, print_header, print_row
 
 from cylx.evaluation import evaluate
+from cylx.fits.robust import Kernel, fit_cylinder
 from cylx.geometry.cylinder import Cylinder
-from cylx.geometry.cylinder_fit import Kernel, fit_cylinder
 from cylx.io import read_cloud
 
 WIDE = 1e6

@@ -13,7 +13,7 @@ import numpy as np
 from tables import Bars, print_header, print_row
 
 import cylx
-from cylx.geometry.bounds import mean_errors_at_bound
+from cylx.fits.cramer_rao import mean_errors_at_bound
 from cylx.synthetic import single
 
 QUANTITIES = ("axis angle, °", "axis offset, r", "radius error, %")

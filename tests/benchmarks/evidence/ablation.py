@@ -1,6 +1,6 @@
 """Run the pipeline without each term of the evidence, on scenes that the weights were not fitted to.
 
-For each term it is taken out of `cylx.evidence.TERMS` and the others get the weights that were fitted without it, from
+For each term it is taken out of `cylx.evidence.weights.TERMS` and the others get the weights that were fitted without it, from
 the file that `fit.py --ablation FILE` writes. What that costs is counted end to end: cylinders missed, and false ones.
 """
 
@@ -16,8 +16,8 @@ from scenes import KINDS, make
 sys.path.append(str(Path(__file__).parents[1]))
 from tables import print_header, print_row
 
-from cylx import evidence
 from cylx.evaluation import evaluate
+from cylx.evidence import weights as evidence
 
 HELD_OUT = range(10000, 10003)
 POINTS = 80000

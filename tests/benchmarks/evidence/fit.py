@@ -1,6 +1,6 @@
 """Fit the weights of `cylx.evidence` to rows of `collect.py`, and say how far they can be trusted.
 
-The terms and their signs are those of `cylx.evidence.TERMS`; the weights are fitted anew. All tables are
+The terms and their signs are those of `cylx.evidence.weights.TERMS`; the weights are fitted anew. All tables are
 cross-validated by scene: each fit is judged by weights that were found without its scene. Fits of a true cylinder that
 need not be found, and those near one that are neither it nor something else, are counted and left out.
 """
@@ -20,7 +20,7 @@ sys.path.append(str(Path(__file__).parents[1]))
 from tables import number, print_header, print_row
 
 from cylx.config import VerificationConfig
-from cylx.evidence import TERMS
+from cylx.evidence.weights import TERMS
 
 LEAST = VerificationConfig().min_inliers
 """Fits of fewer points are refused whatever their confidence, so that it need not be right for them."""
@@ -58,7 +58,7 @@ def signs_of(terms):
 
 
 def written(law, rows, terms=TERMS):
-    """Write a law as the lines of `cylx/evidence.py` that it changes; `usual` is the mean over true cylinders."""
+    """Write a law as the lines of `cylx/evidence/weights.py` that it changes; `usual` is the mean over true cylinders."""
     share = balanced_weights(rows) * rows.true
     usual = share @ rows.terms / share.sum()
     lines = [f"BIAS = {law.bias:.3f}"]
