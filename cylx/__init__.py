@@ -8,7 +8,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-__version__ = "0.1.0"
+from cylx.moved import follow_old_names
+from cylx.version import __version__
 
 if TYPE_CHECKING:
     from cylx.api import extract as extract
@@ -63,6 +64,9 @@ __all__ = [  # noqa: PLE0604  the names of a table are strings
     "__version__",
     *sorted(_HOMES),
 ]
+
+
+follow_old_names()
 
 
 def __getattr__(name: str) -> object:

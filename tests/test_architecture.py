@@ -8,62 +8,43 @@ import pytest
 PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
-EVERYTHING = {
-    "api", "baselines", "catalogue", "cautions", "cli", "config", "consensus", "cylx", "diagnosis", "errors",
-    "evaluation", "evidence", "experiments", "export", "fitting", "game", "geometry", "io", "json_parts",
-    "matplotlib_door", "measures", "noise", "open3d_door", "palette", "payoff", "pipeline", "records", "rejections",
-    "report", "results", "scene", "selection", "stages", "surroundings", "synthetic", "tables",
-}  # fmt: skip
 MAY_IMPORT = {
-    "cylx": EVERYTHING - {"cli"},
     "__main__": {"cli"},
-    "cli": EVERYTHING,
-    "api": {"config", "errors", "io", "pipeline", "records", "results", "selection", "tables"},
-    "diagnosis": {"api", "cylx", "open3d_door", "pipeline", "records", "synthetic"},
-    "export": {"cylx", "errors", "geometry", "palette", "results", "tables"},
-    "consensus": {"records"},
-    "fitting": {"errors", "geometry", "measures", "records", "scene"},
-    "experiments": {
-        "config", "cylx", "errors", "geometry", "matplotlib_door", "open3d_door", "pipeline", "records", "synthetic",
+    "cylx": {
+        "api", "config", "errors", "evaluation", "geometry", "io", "moved", "pipeline", "records", "report", "results",
+        "version",
     },
-    "measures": {"geometry", "records"},
+    "cli": {
+        "api", "config", "errors", "evaluation", "experiments", "export", "io", "optional", "palette", "pipeline",
+        "records", "report", "results", "scene", "synthetic", "version",
+    },
+    "api": {"config", "io", "pipeline", "records", "results", "scene"},
+    "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
-        "baselines", "catalogue", "cautions", "config", "consensus", "errors", "game", "geometry", "measures",
-        "records", "scene", "stages",
+        "baselines", "config", "errors", "fits", "game", "geometry", "records", "scene", "stages",
     },
-    "baselines": {"config", "errors", "geometry", "measures", "open3d_door", "records"},
-    "stages": {
-        "catalogue", "config", "consensus", "errors", "evidence", "game", "geometry", "measures", "payoff", "records",
-        "surroundings",
-    },
-    "noise": {"geometry"},
-    "payoff": {"game", "geometry"},
-    "scene": {"catalogue", "config", "errors", "geometry", "noise", "records"},
-    "results": {"config", "cylx", "errors", "geometry", "json_parts", "records", "tables"},
-    "rejections": {"cylx", "json_parts", "records", "results"},
-    "json_parts": {"records"},
-    "report": {
-        "config", "cylx", "errors", "geometry", "json_parts", "matplotlib_door", "palette", "records", "rejections",
-        "results",
-    },
-    "selection": {"errors", "records"},
-    "surroundings": {"measures"},
-    "tables": {"errors"},
-    "io": {"errors", "geometry", "open3d_door", "palette", "records"},
-    "matplotlib_door": {"errors"},
-    "open3d_door": set(),
-    "palette": set(),
-    "records": {"catalogue", "config", "cylx", "geometry"},
-    "config": {"errors"},
+    "stages": {"config", "evidence", "fits", "game", "geometry", "records"},
+    "report": {"config", "errors", "geometry", "optional", "palette", "records", "results"},
+    "export": {"errors", "geometry", "results", "version"},
+    "scene": {"config", "errors", "fits", "geometry", "records"},
+    "game": {"geometry", "records"},
+    "baselines": {"config", "errors", "fits", "geometry", "optional", "records"},
+    "results": {"config", "errors", "records", "version"},
+    "io": {"errors", "optional", "palette", "records"},
+    "evidence": {"geometry", "records"},
+    "records": {"config", "fits", "geometry"},
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors"},
-    "catalogue": set(),
-    "cautions": {"records"},
-    "evidence": set(),
+    "config": {"errors"},
+    "optional": {"errors"},
+    "fits": {"geometry"},
     "geometry": set(),
-    "game": set(),
     "errors": set(),
+    "moved": set(),
+    "palette": set(),
+    "version": set(),
 }  # fmt: skip
+"""The rooms from the top floor to the ground; each imports from those below it only."""
 OWN_SECTION = {
     "curvature": "CandidatesConfig",
     "local_slices": "SlicingConfig",
@@ -75,10 +56,10 @@ ONLY_IN = {
     "ifcopenshell": {"export"},
     "laspy": {"io"},
     "lazrs": {"io"},
-    "matplotlib": {"experiments", "matplotlib_door", "report"},  # but for types in the door alone
-    "libusb_package": {"open3d_door"},
-    "open3d": {"open3d_door"},
-    "pandas": {"tables"},
+    "matplotlib": {"experiments", "optional", "report"},  # but for types in optional alone
+    "libusb_package": {"optional"},
+    "open3d": {"optional"},
+    "pandas": {"results"},
     "plyfile": {"io"},
     "pye57": {"io"},
     "rich": {"cli"},
@@ -89,10 +70,9 @@ MOST_LINES, MOST_LINES_OF_CODE = 320, 60  # of a file, of a function
 
 
 def room_of(module):
-    """Give the room a dotted module is in; the configuration has several files beside each other."""
+    """Give the room a dotted module is in."""
     parts = module.split(".")
-    name = parts[1] if len(parts) > 1 else "cylx"
-    return "config" if name.startswith("config") or name == "strict_yaml" else name
+    return parts[1] if len(parts) > 1 else "cylx"
 
 
 def imports(tree):
@@ -103,7 +83,7 @@ def imports(tree):
         elif isinstance(node, ast.ImportFrom):
             module = "." * node.level + (node.module or "")
             for alias in node.names:
-                inner = module == "cylx" and room_of(f"cylx.{alias.name}") in EVERYTHING
+                inner = module == "cylx" and alias.name in MAY_IMPORT
                 yield (node.lineno, f"cylx.{alias.name}", None) if inner else (node.lineno, module, alias.name)
 
 
@@ -162,6 +142,43 @@ def faults(module, source):
     return [*import_faults(module, tree), *shape_faults(module, source, tree), *kernel_faults(module, tree)]
 
 
+def file_graph(sources):
+    """Give the files that each file imports, wherever it does; a name of a room counts as the room's own file."""
+    graph = {}
+    for module, source in sources.items():
+        found = set()
+        for _, other, name in imports(ast.parse(source)):
+            inner = f"{other}.{name}"
+            found.add(
+                inner if name is not None and inner in sources and not re_exported(sources[other], inner) else other
+            )
+        graph[module] = found & set(sources) - {module}
+    return graph
+
+
+def re_exported(source, inner):
+    """Tell whether a room has a name of its own for what is in the file of the same name: `resolve` of `resolve.py`."""
+    return any((module, name) == (inner, inner.rpartition(".")[2]) for _, module, name in imports(ast.parse(source)))
+
+
+def circle_in(graph):
+    """Give a way round from a node back to itself, or nothing."""
+    done, way = set(), []
+
+    def walk(node):
+        if node in way:
+            return [*way[way.index(node) :], node]
+        if node in done:
+            return []
+        way.append(node)
+        found = next(filter(None, map(walk, sorted(graph[node]))), [])
+        way.pop()
+        done.add(node)
+        return found
+
+    return next(filter(None, map(walk, sorted(graph))), [])
+
+
 def module_name(path):
     return ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
 
@@ -171,15 +188,44 @@ def test_the_house_is_in_order(path):
     assert faults(module_name(path), path.read_text(encoding="utf-8")) == []
 
 
-def test_the_whole_house_is_looked_at():
-    assert {room_of(module_name(path)) for path in FILES} >= EVERYTHING
+def test_every_room_is_there():
+    assert {room_of(module_name(path)) for path in FILES} == set(MAY_IMPORT)
+
+
+def test_no_room_imports_from_a_floor_above():
+    assert circle_in(MAY_IMPORT) == []
+
+
+def test_no_two_files_import_each_other():
+    assert circle_in(file_graph({module_name(path): path.read_text(encoding="utf-8") for path in FILES})) == []
+
+
+@pytest.mark.parametrize(
+    "sources",
+    [
+        {"cylx.a": "import cylx.b", "cylx.b": "from cylx.a import f"},
+        {"cylx.a": "from cylx import b", "cylx.b": "import cylx.c", "cylx.c": "def f():\n    from cylx.a import g"},
+        {"cylx.a": "if TYPE_CHECKING:\n    from cylx.b import B", "cylx.b": "from cylx.a import f"},
+        {"cylx.r": "from cylx.r.x import f", "cylx.r.x": "from cylx.b import g", "cylx.b": "from cylx.r import f"},
+    ],
+    ids=["of two", "of three", "for types", "through a room"],
+)
+def test_a_circle_is_found(sources):
+    circle = circle_in(file_graph(sources))
+    assert circle[0] == circle[-1]
+    assert set(circle) == set(sources)
+
+
+def test_rooms_within_a_room_make_no_circle():
+    sources = {"cylx.r": "from cylx.r.x import f", "cylx.r.x": "from cylx.r.y import g", "cylx.r.y": ""}
+    assert circle_in(file_graph(sources)) == []
 
 
 @pytest.mark.parametrize(
     ("module", "source", "fault"),
     [
         ("cylx.geometry.plane", "from cylx.records import Slice", "must not import records"),
-        ("cylx.game", "import cylx.geometry.plane", "must not import geometry"),
+        ("cylx.game.dynamics", "import cylx.config.layers", "must not import config"),
         ("cylx.errors", "from cylx import records", "must not import records"),
         ("cylx.stages.slicing", "from cylx.io import read_cloud", "must not import io"),
         ("cylx.stages.slicing", "def f():\n    from cylx.stages.ellipses import fit", "imports another stage"),
@@ -188,18 +234,20 @@ def test_the_whole_house_is_looked_at():
         ("cylx.stages.slicing", "import cylx.config", "own section only, not all of them"),
         ("cylx.stages.slicing", "from cylx.pipeline import extract_cylinders", "must not import pipeline"),
         ("cylx.pipeline", "from cylx.io import read_cloud", "must not import io"),
-        ("cylx.scene", "from cylx.stages.slicing import cut", "must not import stages"),
+        ("cylx.scene.frame", "from cylx.stages.slicing import cut", "must not import stages"),
         ("cylx.api", "from cylx.cli import main", "must not import cli"),
+        ("cylx.results.result", "from cylx import __version__", "must not import cylx"),
+        ("cylx.results.result", "def f():\n    from cylx import show", "must not import cylx"),
         ("cylx.io.ply", "from cylx.results import Result", "must not import results"),
         ("cylx.cli.extract", "import plyfile", "plyfile is only for io"),
-        ("cylx.scene", "def f():\n    import open3d.core as o3c", "open3d is only for open3d_door"),
+        ("cylx.scene.frame", "def f():\n    import open3d.core as o3c", "open3d is only for optional"),
         ("cylx.pipeline", "from rich.progress import Progress", "rich is only for cli"),
         ("cylx.io.ply", "import click", "click is only for cli"),
         ("cylx.stages.slicing", "import matplotlib.cm", "matplotlib is only for experiments"),
-        ("cylx.game", "from .geometry import plane", "relative import"),
+        ("cylx.game.dynamics", "from .geometry import plane", "relative import"),
         ("cylx.attic", "", "a new room"),
         ("cylx.io.utils", "", "'utils' is no name of a room"),
-        ("cylx.game", "@njit(cache=True)\ndef f(a, b):\n    a[0, :7] = b", "kernel f assigns a slice"),
+        ("cylx.game.dynamics", "@njit(cache=True)\ndef f(a, b):\n    a[0, :7] = b", "kernel f assigns a slice"),
         ("cylx.io.ply", "\n" * 321, "321 lines, at most 320"),
         ("cylx.io.ply", "def f():\n" + "    x = 1\n" * 60, "f has 61 lines of code, at most 60"),
     ],
@@ -215,7 +263,7 @@ def test_each_rule_can_fail(module, source, fault):
         ("cylx.stages.slicing", "from cylx.config import SlicingConfig\nfrom cylx.stages.slicing import cut_slices"),
         ("cylx.stages.curvature", "from cylx.config import CandidatesConfig"),
         ("cylx.geometry.ellipse", "from cylx.geometry.plane import Plane"),
-        ("cylx.results", "from cylx import __version__"),
+        ("cylx.results.result", "from cylx.version import __version__"),
         ("cylx.io.ply", "import plyfile\nfrom cylx.records import PointCloud"),
         ("cylx.io.ply", 'def f():\n    """Say.\n' + "    more\n" * 90 + '    """\n' + "\n    # why\n    x = 1\n" * 59),
     ],

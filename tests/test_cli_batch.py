@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import POINTS
-from cylx.cli.batch.many import Many
 from test_cli_extract import on_a_terminal
 
+from cylx.cli.batch.many import Many
 from cylx.cli.batch.memory import memory_available
 from cylx.cli.batch.scans import find_scans
 from cylx.cli.batch.summary import COLUMNS, table_text

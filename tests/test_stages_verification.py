@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from cylx.geometry.coverage import covered_angle
 
 from cylx.config import Config, VerificationConfig
 from cylx.evidence.measures import PLACES, distinct_places, look_at
 from cylx.geometry.cells import Cells
+from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import Cylinder
 from cylx.records import Ground, Noise, Segment
 from cylx.scene import make_frame

@@ -1,15 +1,52 @@
-"""`cylx doctor`: whether the installation works."""
+"""`cylx doctor`: whether the installation works, by one small check for each thing it needs."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+import math
+import os
+import platform
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, metadata, version
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from cylx.cli.options.configuration import debug_option, json_option
 from cylx.cli.terminal.failures import answer
 from cylx.cli.terminal.group import ExampleCommand
+from cylx.version import __version__
+
+if TYPE_CHECKING:
+    from cylx.records import Observer
+
+State = Literal["ok", "missing", "broken"]
+
+OLDEST = 10
+"""Minor version of Python 3."""
+NEEDED = ("click", "numba", "numpy", "plyfile", "pydantic", "PyYAML", "rich", "scipy")
+"""What cylx imports, as it is called on the package index."""
+OPTIONAL = {
+    "matplotlib": ("plots", "pictures of the experiments"),
+    "laspy": ("las", "LAS files"),
+    "lazrs": ("las", "LAZ files"),
+    "pye57": ("e57", "E57 files"),
+    "trimesh": ("mesh", "export of PLY, OBJ, GLB and STL"),
+    "OCP": ("step", "export of STEP"),
+    "ifcopenshell": ("ifc", "export of IFC"),
+    "ezdxf": ("dxf", "export of DXF"),
+    "pandas": ("dataframe", "data frames"),
+}
+"""What does not come with cylx, as it is imported: the extra that brings it, and what for."""
+PACKAGES = {"OCP": ("cadquery-ocp-novtk", "cadquery-ocp")}
+"""Packages that are not called as they are imported."""
+TIGHT = 1 << 30
+"""Bytes of memory below which scans of a million points may not fit."""
 
 
 @click.command(
@@ -23,7 +60,6 @@ def doctor(*, as_json: bool) -> None:
     Libraries, compiled kernels, memory, and the extraction of a cylinder that is made up. The exit code is 0 if
     cylinders can be found and 1 if not; optional libraries that are missing are no fault. Nothing is fetched.
     """
-    from cylx.cli.doctor import diagnose
     from cylx.cli.terminal.display import Conversation, show_table
 
     with Conversation().progress() as observer:
@@ -37,3 +73,202 @@ def doctor(*, as_json: bool) -> None:
         answer("cylinders can be found\n" if works else "cylinders cannot be found: see what is missing or broken\n")
     if not works:
         raise click.exceptions.Exit(1)
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """What was found of one thing.
+
+    Parameters
+    ----------
+    name : str
+        The thing.
+    state : {'ok', 'missing', 'broken'}
+    detail : str
+        What there is, or what is wrong.
+    remedy : str
+        What to do; empty if nothing is needed.
+    needed : bool
+        Whether cylinders cannot be found without it.
+    """
+
+    name: str
+    state: State
+    detail: str
+    remedy: str = ""
+    needed: bool = True
+
+
+def diagnose(observer: Observer | None = None) -> list[Check]:
+    """Check everything, with a small extraction at the end.
+
+    Parameters
+    ----------
+    observer : Observer, optional
+        Told of the progress of the extraction, which compiles the kernels where they are not.
+    """
+    return [
+        check_python(),
+        *(check_package(name) for name in NEEDED),
+        check_open3d(),
+        check_libusb(),
+        check_kernels(),
+        check_machine(),
+        *(check_extra(name) for name in OPTIONAL if OPTIONAL[name][0] in extras_there_are()),
+        check_extraction(observer),
+    ]
+
+
+def check_python() -> Check:
+    """Check the version of Python."""
+    detail = f"{platform.python_version()} ({platform.system()}, {platform.machine()}), cylx {__version__}"
+    if platform.python_version_tuple()[0] != "3" or int(platform.python_version_tuple()[1]) < OLDEST:
+        return Check("Python", "broken", detail, f"install Python 3.{OLDEST} or newer")
+    return Check("Python", "ok", detail)
+
+
+def check_package(name: str) -> Check:
+    """Check a package that cylx needs.
+
+    Parameters
+    ----------
+    name : str
+        As it is called on the package index.
+    """
+    module = {"PyYAML": "yaml"}.get(name, name)
+    return _imported(name, lambda: import_module(module), _version(name), f"pip install {name}")
+
+
+def check_open3d() -> Check:
+    """Check open3d, which reads packed PCD files and gives normals to the methods that need them."""
+    from cylx.optional.open3d import import_open3d
+
+    found = _version("open3d-cpu") or _version("open3d")
+    return _imported("open3d", import_open3d, found, "pip install --force-reinstall cylx")
+
+
+def check_libusb() -> Check:
+    """Check the copy of libusb that open3d is linked with on Linux; elsewhere it brings its own."""
+    if sys.platform != "linux":
+        return Check("libusb", "ok", "open3d brings its own here", needed=False)
+    found = _version("libusb-package")
+    remedy = "pip install libusb-package, unless open3d works"
+    if found is None:
+        return Check("libusb", "missing", "libusb-package is not installed", remedy, needed=False)
+    return Check("libusb", "ok", f"libusb-package {found}", needed=False)
+
+
+def check_kernels() -> Check:
+    """Check that the numerical kernels are compiled, and that they can be kept."""
+    told = os.environ.get("NUMBA_CACHE_DIR")
+    source = f"NUMBA_CACHE_DIR={told}" if told else "NUMBA_CACHE_DIR is not set"
+    remedy = "set NUMBA_CACHE_DIR to a folder that can be written to"
+    try:
+        from cylx.pipeline.warmup import kernel_folder, kernels_are_cold
+
+        folder = Path(kernel_folder())
+        cold = kernels_are_cold()
+    except (ImportError, OSError, RuntimeError) as error:  # numba finds no folder for them
+        return Check("kernels", "broken", f"{_first_line(error)}; {source}", remedy)
+    if not os.access(folder, os.W_OK):
+        fault = f"cannot be kept: {folder} is read-only; {source}"
+        return Check("kernels", "broken", f"{fault}; every run compiles them anew", remedy, needed=False)
+    state = "were not compiled yet" if cold else "are compiled"
+    return Check("kernels", "ok", f"{state}, and kept in {folder}; {source}")
+
+
+def check_machine() -> Check:
+    """Check the processor and the memory that is free."""
+    cores = os.cpu_count() or 1
+    with suppress(AttributeError):  # not on every system
+        cores = len(os.sched_getaffinity(0))
+    count = f"{cores} core{'' if cores == 1 else 's'}"
+    free = free_memory()
+    if free is None:
+        return Check("machine", "ok", f"{count}; free memory unknown", needed=False)
+    detail = f"{count}, {free / 2**30:.1f} GB of memory free"
+    remedy = "close other programs, or thin large scans" if free < TIGHT else ""
+    return Check("machine", "ok", detail, remedy, needed=False)
+
+
+def check_extra(name: str) -> Check:
+    """Check a library that does not come with cylx.
+
+    Parameters
+    ----------
+    name : str
+        A key of `OPTIONAL`.
+    """
+    extra, purpose = OPTIONAL[name]
+    found = next(filter(None, map(_version, PACKAGES.get(name, (name,)))), None)
+    remedy = f"pip install 'cylx[{extra}]'"
+    return _imported(name, lambda: import_module(name), found, remedy, purpose, needed=False)
+
+
+def check_extraction(observer: Observer | None = None) -> Check:
+    """Check that a cylinder of radius 1 that was made up is found, its radius within 1 %."""
+    remedy = "if all else is well, run 'cylx extract --debug' on a scan, and report what it says"
+    try:
+        from cylx.api import extract
+        from cylx.records import SilentObserver
+        from cylx.synthetic import single
+
+        found = extract(single(points=2000, seed=1).points, observer=observer or SilentObserver())
+    except Exception as error:  # noqa: BLE001  whatever it is, it is what was asked for
+        return Check("extraction", "broken", f"{type(error).__name__}: {_first_line(error)}", remedy)
+    radii = [fit.cylinder.radius for fit in found.cylinders]
+    if len(radii) != 1 or not math.isclose(radii[0], 1.0, rel_tol=0.01):
+        wrong = ", ".join(f"{radius:.4g}" for radius in radii) or "none"
+        return Check("extraction", "broken", f"of one cylinder of radius 1 it finds: {wrong}", remedy)
+    return Check("extraction", "ok", f"finds a cylinder of radius 1 as {radii[0]:.4f}")
+
+
+def extras_there_are() -> set[str]:
+    """Name the extras that the installed cylx has."""
+    with suppress(PackageNotFoundError):
+        return set(metadata("cylx").get_all("Provides-Extra") or ())
+    return {extra for extra, _ in OPTIONAL.values()}
+
+
+def free_memory() -> int | None:
+    """Give the memory that is free, bytes; None where the system does not say."""
+    with suppress(OSError):
+        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024 * int(line.split()[1])
+    with suppress(AttributeError, OSError, ValueError):
+        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    return None
+
+
+def _imported(
+    name: str, load: Callable[[], object], found: str | None, remedy: str, purpose: str = "", *, needed: bool = True
+) -> Check:
+    """Import something and say how that went."""
+    aim = f", for {purpose}" if purpose else ""
+    try:
+        load()
+    except ModuleNotFoundError as error:
+        if found is None:
+            return Check(name, "missing", f"is not installed{aim}", remedy, needed)
+        return Check(name, "broken", f"{found}, but {_first_line(error)}", remedy, needed)
+    except Exception as error:  # noqa: BLE001  a library may fail in any way when it is imported
+        return Check(name, "broken", f"{found or 'is there'}, but {_first_line(error)}", remedy, needed)
+    return Check(name, "ok", f"{found or 'version unknown'}{aim}", needed=needed)
+
+
+def _version(package: str) -> str | None:
+    """Give the version of an installed package."""
+    with suppress(PackageNotFoundError):
+        return version(package)
+    return None
+
+
+def _first_line(error: BaseException) -> str:
+    """Give what an error says, on one line."""
+    return next(iter(_lines(error)), type(error).__name__)
+
+
+def _lines(error: BaseException) -> Iterator[str]:
+    """Give the lines of an error that say something."""
+    return filter(None, map(str.strip, str(error).splitlines()))

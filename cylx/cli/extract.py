@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.batch.jobs import Job, check_apart, check_format, check_outputs, plan_jobs, write_job
+from cylx.cli.batch.jobs import check_apart, check_outputs, plan_jobs
 from cylx.cli.batch.many import Many, made_folder
 from cylx.cli.batch.meshes import check_meshes
 from cylx.cli.options.batch import with_many
@@ -16,11 +15,9 @@ from cylx.cli.options.configuration import complete_files, configured, debug_opt
 from cylx.cli.options.selection import selecting
 from cylx.cli.options.units import units_option
 from cylx.cli.terminal.group import ExampleCommand
-from cylx.cli.terminal.stopwatch import Stopwatch
 
 if TYPE_CHECKING:
     from cylx.cli.batch.batch import Batch
-    from cylx.cli.batch.outcomes import Finished
     from cylx.cli.terminal.display import Conversation
     from cylx.config import Config
     from cylx.records import Selection
@@ -117,6 +114,7 @@ def extract(
     off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
     """
     from cylx.cli.batch.batch import Batch
+    from cylx.cli.batch.run import Run
     from cylx.cli.batch.scans import find_scans
 
     output = many.output(output)
@@ -140,70 +138,6 @@ def extract(
         finally:
             if profile is not None and batch.profiles:
                 write_profile(profile, batch, overwrite=overwrite)
-
-
-@dataclass(frozen=True)
-class Run:
-    """How the scans of one call of `cylx extract` are done.
-
-    Parameters
-    ----------
-    settings : Config
-        The configuration.
-    threads : int or None
-        Number of threads.
-    require : int or None
-        Fewest cylinders in each scan.
-    overwrite : bool
-        Whether files that exist may be replaced.
-    talk : Conversation
-        What is shown.
-    selection : Selection
-        Which points take part.
-    """
-
-    settings: Config
-    threads: int | None
-    require: int | None
-    overwrite: bool
-    talk: Conversation
-    selection: Selection
-
-    def extract_one(self, job: Job) -> Finished:
-        """Read a scan, find its cylinders, write them, and say so.
-
-        Raises
-        ------
-        InputError
-            If the scan cannot be read or used.
-        OutputError
-            If the outputs cannot be written.
-        """
-        from cylx.cli.batch.outcomes import Finished
-        from cylx.cli.terminal.display import Observers, observed
-        from cylx.cli.terminal.startup import collect_rarely, import_numba_without_blas
-
-        collect_rarely()
-        import_numba_without_blas()
-        from cylx.io import read_cloud
-        from cylx.pipeline import extract_cylinders
-        from cylx.scene import select
-
-        stopwatch = Stopwatch(job.scan)
-        with self.talk.progress() as display:
-            observer = Observers(display, stopwatch)
-            with observed(observer, "reading"):
-                cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
-            check_format(job, cloud)
-            extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
-            with observed(observer, "writing"):
-                remarks = write_job(job, extraction, overwrite=self.overwrite)
-        found = len(extraction.cylinders)
-        profile = stopwatch.report(cloud.rows, found)
-        self.talk.report(job, extraction)
-        for remark in remarks:
-            self.talk.say(f"warning: {remark}")
-        return Finished(cloud.rows, found, extraction.warnings, profile)
 
 
 def write_profile(path: str, batch: Batch, *, overwrite: bool) -> None:

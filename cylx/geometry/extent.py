@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.numerics import fill_frame, median_of_positive, sort_in_place
+from cylx.geometry.numerics import median_of_positive, sort_in_place
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -54,54 +54,6 @@ def visible_extent(
     ends = np.empty(2)
     found = _find_ends(np.ascontiguousarray(heights), np.ascontiguousarray(angles), half, radius, filled, doubt, ends)
     return (float(ends[0]), float(ends[1])) if found else None
-
-
-def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
-    """Give heights and angles of the points within `width` of a cylinder's surface.
-
-    Parameters
-    ----------
-    points : ndarray of shape (N, 3)
-    model : ndarray of shape (7,)
-        A point of the axis, where heights are zero, its unit direction, the radius.
-    width : float
-
-    Returns
-    -------
-    heights, angles : ndarray of shape (n,)
-    """
-    heights, residuals, angles = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
-    n = fill_coordinates(points, model, width, heights, residuals, angles)
-    return heights[:n], angles[:n]
-
-
-def coordinates_of(
-    points: FloatArray, indices: IndexArray, model: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give heights, signed distances to a cylinder's surface, and angles of some of the points, shape (n,) each."""
-    heights, residuals, angles = np.empty(len(indices)), np.empty(len(indices)), np.empty(len(indices))
-    fill_coordinates(points[indices], model, math.inf, heights, residuals, angles)
-    return heights, residuals, angles
-
-
-@njit(cache=True, nogil=True)
-def fill_coordinates(
-    points: FloatArray, model: FloatArray, width: float, heights: FloatArray, residuals: FloatArray, angles: FloatArray
-) -> int:
-    """Fill in height, signed distance to the surface, and angle of the points within `width` of it; count them."""
-    frame = np.empty((2, 3))
-    fill_frame(model[3:6], frame)
-    n = 0
-    for i in range(len(points)):
-        dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
-        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
-        residual = math.sqrt(x * x + y * y) - model[6]
-        if abs(residual) < width:
-            heights[n] = dx * model[3] + dy * model[4] + dz * model[5]
-            residuals[n], angles[n] = residual, math.atan2(y, x)
-            n += 1
-    return n
 
 
 @njit(cache=True, nogil=True)

@@ -1,14 +1,27 @@
-"""Linear algebra of a few rows, as scalar loops for the kernels: no allocation, no LAPACK, quick to compile."""
+"""What the kernels compute with: linear algebra of a few rows, order statistics, and how sums may be reordered.
+
+All are scalar loops: no allocation, no LAPACK, quick to compile. A kernel that adds up over points reads them as
+`xyz`, shape (3, N), a coordinate a row, and lets the compiler add in another order than written. Then several points go
+through one of the processor's vector instructions: fits take a fifth of the time. It rounds differently from one kind
+of processor to another, as the linear algebra of NumPy does; nothing else depends on it, not even on where the points
+lie in memory.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import Final
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+
+REORDERED: Final = {"reassoc", "nsz", "arcp", "contract"}
+"""What the compiler may do to sums; NaN and infinity keep their meaning."""
+FINITE: Final = REORDERED | {"nnan"}
+"""The same, for the least and the greatest of numbers that are all finite."""
 
 
 @njit(cache=True, nogil=True)
@@ -107,3 +120,40 @@ def fill_frame(direction: FloatArray, frame: FloatArray) -> None:
     a, b, c = a / length, b / length, c / length
     frame[0, 0], frame[0, 1], frame[0, 2] = a, b, c
     frame[1, 0], frame[1, 1], frame[1, 2] = y * c - z * b, z * a - x * c, x * b - y * a
+
+
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Give a x b of vectors in the last axis, (..., 3) each; `numpy.cross` takes ten times as long for few vectors."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+
+
+@njit(cache=True, nogil=True)
+def sort_in_place(values: FloatArray, n: int) -> None:
+    """Sort values[:n], ascending: Shell's method with Knuth's gaps, quick to compile."""
+    gap = 1
+    while gap < n // 3:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(gap, n):
+            value, j = values[i], i
+            while j >= gap and values[j - gap] > value:
+                values[j] = values[j - gap]
+                j -= gap
+            values[j] = value
+        gap //= 3
+
+
+@njit(cache=True, nogil=True)
+def median_of_positive(values: FloatArray, n: int, scratch: FloatArray) -> float:
+    """Give the median of those of values[:n] that are positive; 0 if there are none."""
+    m = np.int64(0)  # of a literal a kernel of its own would be compiled
+    for i in range(n):
+        if values[i] > 0.0:
+            scratch[m] = values[i]
+            m += 1
+    if m == 0:
+        return 0.0
+    sort_in_place(scratch, m)
+    return float(0.5 * (scratch[(m - 1) // 2] + scratch[m // 2]))

@@ -1,23 +1,34 @@
-"""Outputs that appear whole or not at all."""
+"""Outputs that appear whole or not at all, one or several together.
+
+Until then they are temporary files beside what they become: their names tell whose they are, so that what the dead left
+can go.
+"""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
+import platform
+import re
+import secrets
 import stat
 import sys
+import zlib
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from cylx.errors import OutputError
 from cylx.io.inputs import printable
-from cylx.io.outputs import temporary_beside
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
 
-_STDOUT = ("-", "/dev/stdout")
+STREAM = "-"
+_STDOUT = (STREAM, "/dev/stdout")
+_NAME = re.compile(r"\.cylx-([0-9a-f]{8})-(\d+)-[0-9a-f]{16}(\..*)?", re.DOTALL)
 
 
 def check_writable(path: str | Path, *, overwrite: bool) -> None:
@@ -111,6 +122,89 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> None:
         If that is not possible.
     """
     write_bytes(path, text.encode("utf-8"), overwrite=overwrite)
+
+
+@contextmanager
+def moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[str | Path]:
+    """Give a temporary name beside `name`, moved there if all goes well, removed if not.
+
+    A stream or a device has no other name than its own.
+    """
+    if name == STREAM or not (Path(name).is_file() or not Path(name).exists()):
+        yield name
+        return
+    check_writable(name, overwrite=overwrite)
+    target = Path(os.path.realpath(name))
+    staged = temporary_beside(target, target.suffix)
+    try:
+        yield staged
+        staged.replace(target)
+    finally:
+        staged.unlink(missing_ok=True)
+
+
+def write_together(contents: Mapping[str, bytes], *, overwrite: bool) -> None:
+    """Write several files, all or nothing.
+
+    Parameters
+    ----------
+    contents : mapping of str to bytes
+        What to write, by file; not to streams.
+    overwrite : bool
+        Whether files that exist may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If one of them cannot be written.
+    """
+    with contextlib.ExitStack() as stack:
+        for name, data in contents.items():
+            write_bytes(stack.enter_context(moved_at_the_end(name, overwrite=overwrite)), data, overwrite=overwrite)
+
+
+def temporary_beside(target: Path, suffix: str) -> Path:
+    """Name a temporary file in the folder of `target`, hidden, with the machine and the process in its name."""
+    return target.with_name(f".cylx-{_machine()}-{os.getpid()}-{secrets.token_hex(8)}{suffix}")
+
+
+def remove_leftovers(folder: str | Path, process: int | None = None) -> None:
+    """Remove the temporary files that a process of this machine has left in a folder.
+
+    Parameters
+    ----------
+    folder : str or Path
+        What cannot be removed from it stays there.
+    process : int, optional
+        The id of a process that has ended; by default all that have ended.
+    """
+    with contextlib.suppress(OSError):
+        for path in Path(folder).iterdir():
+            found = _NAME.fullmatch(path.name)
+            if found is None or found[1] != _machine():
+                continue
+            owner = int(found[2])
+            if owner == process if process is not None else _has_ended(owner):
+                with contextlib.suppress(OSError):
+                    path.unlink()
+
+
+@cache
+def _machine() -> str:
+    return f"{zlib.crc32(platform.node().encode('utf-8', 'replace')):08x}"
+
+
+def _has_ended(process: int) -> bool:
+    """Say whether a process is certainly gone; Windows has no way to ask that is not deadly."""
+    if os.name == "nt":
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from cylx.fits.nominal_radius import Choice, Decision
 from cylx.geometry.cylinder import Cylinder
 from cylx.records.clouds import PointCloud, Scene
 from cylx.records.progress import StageReport
+from cylx.records.shown import html_in_notebook
 
 if TYPE_CHECKING:
     from cylx.config import Config
@@ -261,9 +262,7 @@ class Extraction:
         return f"{count} cylinder{'' if count == 1 else 's'} in {len(self.labels)} points"
 
     def _repr_html_(self) -> str:
-        from cylx import show  # noqa: PLC0415  what shows records knows them, not they it
-
-        return show(self).html
+        return html_in_notebook(self)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Give the cylinders as arrays, in their order.

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from cylx.version import __version__
 from pydantic import ConfigDict, Field, JsonValue
 
 from cylx.results.parts import Input, Part, drop_missing, text_of
 from cylx.results.result import Measured
+from cylx.version import __version__
 
 if TYPE_CHECKING:
     from cylx.records import Extraction, Rejection

@@ -12,7 +12,6 @@ from math import degrees, isfinite
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-from cylx.version import __version__
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
@@ -20,6 +19,7 @@ from cylx.config import describe_fault
 from cylx.errors import InputError
 from cylx.results.parts import Count, Input, Length, Matrix, Number, Part, Vector, drop_missing, plain_numbers, text_of
 from cylx.results.table import dataframe_of
+from cylx.version import __version__
 
 if TYPE_CHECKING:
     from cylx.records import CylinderFit, Extraction, Scene, StageReport
@@ -279,9 +279,9 @@ class Result(Part):
         return f"{count} cylinder{'' if count == 1 else 's'} in {self.input.file!r}"
 
     def _repr_html_(self) -> str:
-        from cylx import show  # noqa: PLC0415  what shows results knows them, not they it
+        from cylx.records.shown import html_in_notebook  # noqa: PLC0415  records bring numba
 
-        return show(self).html
+        return html_in_notebook(self)
 
     def to_dataframe(self) -> Any:  # noqa: ANN401  pandas is an extra
         """Give the cylinders as a pandas data frame, its columns those of `cylx.results.table.table_of`."""

@@ -1,4 +1,4 @@
-"""What a cloud says about itself: its spacing, its noise, its own frame, and so the meaning of every `null`.
+"""What a cloud says about itself: its spacing, its noise, its own frame.
 
 The frame has the spacing as its unit, the corner of the cloud as its zero and the Morton curve as the order of the
 points. All stages work in it, which is why unit, origin and order of the points do not change a result.
@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.errors import InputError
-from cylx.fits.likelihood import Prior
-from cylx.fits.nominal_radius import Catalogue
 from cylx.geometry.bounding_box import box_of, extent_of, fill_scatter, widest_deviation
 from cylx.geometry.morton import BITS, morton_codes
 from cylx.records import Frame, Noise, Scene, cell_keys
@@ -191,82 +189,3 @@ def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Fr
         spacing=spacing,
     )
     return frame, scene
-
-
-def resolve(config: Config, scene: Scene) -> Config:
-    """Replace every `null` that means "from the cloud" by its value, in scene units.
-
-    Parameters
-    ----------
-    config : Config
-    scene : Scene
-
-    Returns
-    -------
-    Config
-    """
-    least, greatest, radius = config.scene.radius_min, config.scene.radius_max, config.scene.known_radius
-    catalogue = config.scene.catalogue
-    thickness = config.slicing.thickness or 2.0 * max(scene.spacing, 2.0 * scene.noise)
-    known = {
-        "scene": {
-            "spacing": scene.spacing,
-            "noise": scene.noise,
-            "radius_min": least or min(thinnest(scene)[0], greatest or math.inf),
-            "radius_max": greatest or max(0.5 * scene.extent, least or 0.0),
-            "known_radius_sd": config.scene.known_radius_sd or (radius and 1e-3 * radius),
-            "catalogue": catalogue and [entry.model_copy(update={"tolerance": entry.spread}) for entry in catalogue],
-        },
-        "slicing": {"thickness": thickness},
-        "ellipses": {"tolerance": config.ellipses.tolerance or 4.0 * scene.noise + 0.06 * thickness},
-        "msac": {"distance": config.msac.distance or 3.0 * scene.noise},
-        "tran": {"distance": config.tran.distance or 3.0 * scene.noise},
-        "jin": {"distance": config.jin.distance or 3.0 * scene.noise},
-    }
-    return config.model_copy(
-        update={name: getattr(config, name).model_copy(update=values) for name, values in known.items()}
-    )
-
-
-def thinnest(scene: Scene) -> tuple[float, float]:
-    """Give the least radius that is looked for, and that from which a cylinder that stands free is found as a rule.
-
-    Parameters
-    ----------
-    scene : Scene
-
-    Returns
-    -------
-    looked_for, found : float
-        Scene units.
-    """
-    return max(3.0 * scene.noise, 0.25 * scene.spacing), max(6.0 * scene.noise, 0.5 * scene.spacing)
-
-
-def radius_range(config: Config, frame: Frame) -> tuple[float, float]:
-    """Give the least and the greatest radius looked for in frame units, from a resolved configuration."""
-    low, high = config.scene.radius_min, config.scene.radius_max
-    return (low or 0.0) / frame.spacing, (high or math.inf) / frame.spacing
-
-
-def known_of(config: Config, frame: Frame) -> Prior | None:
-    """Give what is known of each cylinder in frame units, from a resolved configuration; None if nothing is."""
-    scene = config.scene
-    drawn = scene.axis is not None and scene.axis_sd_deg is not None
-    if scene.known_radius is None and not drawn:
-        return None
-    radius = None if scene.known_radius is None else scene.known_radius / frame.spacing
-    deviation = (scene.known_radius_sd or math.inf) / frame.spacing
-    axis = np.array(scene.axis, dtype=np.float64) if drawn else None
-    return Prior(
-        radius, deviation, None if axis is None else axis / np.linalg.norm(axis), math.radians(scene.axis_sd_deg or 0.0)
-    )
-
-
-def catalogue_of(config: Config, frame: Frame) -> Catalogue | None:
-    """Give the nominal radii in frame units, from a resolved configuration; None without a catalogue."""
-    entries = config.scene.catalogue
-    if entries is None:
-        return None
-    radii = tuple(entry.radius / frame.spacing for entry in entries)
-    return Catalogue(radii, tuple(entry.spread / frame.spacing for entry in entries))

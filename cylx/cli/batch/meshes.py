@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-import click
-
-from cylx.cli.options.configuration import Command
 from cylx.errors import UsageError
 
 if TYPE_CHECKING:
     from cylx.export import Drawing, Exported
     from cylx.results import ResultCylinder
-
-UNITS = ("m", "mm", "cm", "in", "ft")
-
-
-def units_option(which: str) -> Callable[[Command], Command]:
-    """Make the option `--units`; `which` says what needs it."""
-    return click.option("--units", type=click.Choice(UNITS), help=f"Unit of the scan; {which} it.")
 
 
 def check_meshes(names: Sequence[str], units: str | None) -> None:

@@ -15,7 +15,6 @@ from cylx.errors import NothingFoundError
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
-    from cylx.cli.batch.run import Run
 
 
 @dataclass(frozen=True)
@@ -77,17 +76,6 @@ def check_required(job: Job, found: int, required: int | None) -> None:
     if required is not None and found < required:
         fault = f"{found} found, {required} required"
         raise NothingFoundError(job.scan, f"cylinders: {fault}", "look at the scan, or require fewer")
-
-
-def attempt(run: Run, debug: bool, job: Job) -> Outcome:
-    """Do a scan and say what became of it; whatever fails is no reason not to do the next one."""
-    finished = None
-    try:
-        finished = run.extract_one(job)
-        check_required(job, finished.cylinders, run.require)
-    except Exception as failure:  # noqa: BLE001  described, a bug as a bug, with its exit code and its traceback
-        return failed_outcome(failure, finished, debug=debug)
-    return Outcome("done", finished, peak=peak_memory())
 
 
 def failed_outcome(failure: Exception, finished: Finished | None, *, debug: bool) -> Outcome:

@@ -7,11 +7,13 @@ import io
 import os
 import sys
 import traceback
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from types import TracebackType
 
 import click
 
-from cylx.errors import CylxError, OutputError
+from cylx.errors import CylxError, InputError, OutputError
 
 DEBUG = "cylx.debug"  # key in the context's meta
 BUG, USAGE, UNUSABLE, INTERRUPTED, READER_GONE = 1, 2, 3, 130, 141
@@ -106,6 +108,25 @@ def answer(text: str) -> None:
         raise
     except OSError as error:
         raise _unwritten(error) from error
+
+
+@contextmanager
+def called_by_file(files: Mapping[str, str]) -> Iterator[None]:
+    """Let errors about a document name its file.
+
+    Parameters
+    ----------
+    files : mapping of str to str
+        What the library calls the document, and its file.
+    """
+    try:
+        yield
+    except InputError as error:
+        for name, file in files.items():
+            if error.place.startswith(name):
+                rest = error.place.removeprefix(name).lstrip(".")
+                raise InputError(f"{file}: {rest}" if rest else file, error.fault, error.remedy) from error
+        raise
 
 
 def flush_answer() -> BrokenPipeError | OutputError | None:

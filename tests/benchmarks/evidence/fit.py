@@ -58,7 +58,7 @@ def signs_of(terms):
 
 
 def written(law, rows, terms=TERMS):
-    """Write a law as the lines of `cylx/evidence/weights.py` that it changes; `usual` is the mean over true cylinders."""
+    """Write a law as those lines of `cylx/evidence/weights.py` that change; `usual` is the mean over true cylinders."""
     share = balanced_weights(rows) * rows.true
     usual = share @ rows.terms / share.sum()
     lines = [f"BIAS = {law.bias:.3f}"]

@@ -1,0 +1,83 @@
+"""What is said of a scan when it is done: what was found in it, and where that was written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from cylx.cli.terminal.display import Conversation, show_table
+from cylx.cli.terminal.failures import tell
+
+if TYPE_CHECKING:
+    from cylx.cli.batch.jobs import Job
+    from cylx.records import CylinderFit, Extraction
+
+_MOST_ROWS = 20
+_CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "confidence", "direction"]
+
+
+def report(talk: Conversation, job: Job, extraction: Extraction) -> None:
+    """Say what was found in a scan and where it was written."""
+    if talk.quiet:
+        return
+    fits = extraction.cylinders
+    tell(found_line(job, len(fits)))
+    for warning in extraction.warnings:
+        tell(f"warning: {warning}")
+    if talk.verbose:
+        scene = extraction.scene
+        tell(f"spacing {scene.spacing:.4g}, noise {scene.noise:.4g}, extent {scene.extent:.4g}")
+        show_table(["stage", "considered", "kept", "rejected"], _stage_rows(extraction), err=True)
+    if fits:
+        shown = fits if talk.verbose else fits[:_MOST_ROWS]
+        header, rows = _CYLINDER_HEADER, [_cylinder_row(i, fit) for i, fit in enumerate(shown)]
+        if extraction.config.scene.catalogue:
+            header, rows = [*header, "nominal"], [[*row, _nominal(f)] for row, f in zip(rows, shown, strict=True)]
+        show_table(header, rows, err=True)
+        if len(shown) < len(fits):
+            tell(f"… and {len(fits) - len(shown)} more; -v shows them all")
+
+
+def found_line(job: Job, found: int) -> str:
+    """Write how many cylinders a scan has, and where they were written."""
+    from cylx.io import printable
+
+    written = [printable(name) for name in job.written(found) if name != "-"]
+    scan = "standard input" if job.scan == "-" else printable(job.scan)
+    names = " and ".join(filter(None, [", ".join(written[:-1]), *written[-1:]]))
+    return f"{scan}: {found} cylinder{'' if found == 1 else 's'}" + (f", written to {names}" if written else "")
+
+
+def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
+    """Write one line of the table of cylinders."""
+    shape = fit.cylinder
+    direction = " ".join(f"{x:.3f}".replace("-0.000", "0.000") for x in shape.direction)
+    numbers = [f"{shape.radius:.5g}", f"{shape.height:.4g}", f"{fit.coverage * 57.29577951308232:.0f}°"]
+    return [
+        str(index),
+        *numbers,
+        str(fit.inliers),
+        f"{fit.rmse:.3g}",
+        "-" if fit.confidence is None else f"{fit.confidence:.2f}",
+        direction,
+    ]
+
+
+def _nominal(fit: CylinderFit) -> str:
+    """Name the entry of the catalogue that a cylinder was drawn to, in doubt with a question mark."""
+    nominal = fit.nominal
+    if nominal is None or nominal.decision == "none":
+        return "-"
+    return (nominal.name or f"{nominal.nominal_radius:.5g}") + ("?" if nominal.decision == "ambiguous" else "")
+
+
+def _stage_rows(extraction: Extraction) -> list[list[str]]:
+    """Write the lines of the table of stages."""
+    return [
+        [
+            stage.name,
+            str(stage.considered),
+            str(stage.kept),
+            ", ".join(f"{reason} {count}" for reason, count in stage.rejected.items()),
+        ]
+        for stage in extraction.stages
+    ]

@@ -1,0 +1,90 @@
+"""One scan among those of a call of `cylx extract`: read, its cylinders found, written, and told of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from cylx.cli.batch.jobs import Job, check_format, write_job
+from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_outcome
+from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
+
+if TYPE_CHECKING:
+    from cylx.cli.terminal.display import Conversation
+    from cylx.config import Config
+    from cylx.records import Selection
+
+
+@dataclass(frozen=True)
+class Run:
+    """How the scans of one call of `cylx extract` are done.
+
+    Parameters
+    ----------
+    settings : Config
+        The configuration.
+    threads : int or None
+        Number of threads.
+    require : int or None
+        Fewest cylinders in each scan.
+    overwrite : bool
+        Whether files that exist may be replaced.
+    talk : Conversation
+        What is shown.
+    selection : Selection
+        Which points take part.
+    """
+
+    settings: Config
+    threads: int | None
+    require: int | None
+    overwrite: bool
+    talk: Conversation
+    selection: Selection
+
+    def extract_one(self, job: Job) -> Finished:
+        """Read a scan, find its cylinders, write them, and say so.
+
+        Raises
+        ------
+        InputError
+            If the scan cannot be read or used.
+        OutputError
+            If the outputs cannot be written.
+        """
+        from cylx.cli.batch.found import report
+        from cylx.cli.terminal.display import Observers, observed
+        from cylx.cli.terminal.startup import collect_rarely, import_numba_without_blas
+
+        collect_rarely()
+        import_numba_without_blas()
+        from cylx.io import read_cloud
+        from cylx.pipeline import extract_cylinders
+        from cylx.scene import select
+
+        stopwatch = Stopwatch(job.scan)
+        with self.talk.progress() as display:
+            observer = Observers(display, stopwatch)
+            with observed(observer, "reading"):
+                cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
+            check_format(job, cloud)
+            extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
+            with observed(observer, "writing"):
+                remarks = write_job(job, extraction, overwrite=self.overwrite)
+        found = len(extraction.cylinders)
+        profile = stopwatch.report(cloud.rows, found)
+        report(self.talk, job, extraction)
+        for remark in remarks:
+            self.talk.say(f"warning: {remark}")
+        return Finished(cloud.rows, found, extraction.warnings, profile)
+
+
+def attempt(run: Run, debug: bool, job: Job) -> Outcome:
+    """Do a scan and say what became of it; whatever fails is no reason not to do the next one."""
+    finished = None
+    try:
+        finished = run.extract_one(job)
+        check_required(job, finished.cylinders, run.require)
+    except Exception as failure:  # noqa: BLE001  described, a bug as a bug, with its exit code and its traceback
+        return failed_outcome(failure, finished, debug=debug)
+    return Outcome("done", finished, peak=peak_memory())

@@ -1,0 +1,16 @@
+"""The option `--units`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import click
+
+from cylx.cli.options.configuration import Command
+
+UNITS = ("m", "mm", "cm", "in", "ft")
+
+
+def units_option(which: str) -> Callable[[Command], Command]:
+    """Make the option `--units`; `which` says what needs it."""
+    return click.option("--units", type=click.Choice(UNITS), help=f"Unit of the scan; {which} it.")

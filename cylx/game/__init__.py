@@ -1,0 +1,6 @@
+"""The game that candidates play (sections 3.1 and 3.3): dynamics, payoff, and who agrees with a cylinder."""
+
+from cylx.game.dynamics import SparsePayoff, evolve
+from cylx.game.payoff import local_payoff, screw_payoff
+
+__all__ = ["SparsePayoff", "evolve", "local_payoff", "screw_payoff"]

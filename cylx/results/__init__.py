@@ -1,0 +1,50 @@
+"""What was found as JSON objects and tables: the result, what was rejected, and what the files have in common.
+
+The names are resolved when they are first used: what needs one file of the room does not wait for the others.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from cylx.results.rejected import RejectedCylinder as RejectedCylinder
+    from cylx.results.rejected import Rejections as Rejections
+    from cylx.results.rejected import rejections_schema as rejections_schema
+    from cylx.results.result import CatalogueMatch as CatalogueMatch
+    from cylx.results.result import Measured as Measured
+    from cylx.results.result import Numbered as Numbered
+    from cylx.results.result import Result as Result
+    from cylx.results.result import ResultCylinder as ResultCylinder
+    from cylx.results.result import SceneScale as SceneScale
+    from cylx.results.result import Stage as Stage
+    from cylx.results.result import Uncertainty as Uncertainty
+    from cylx.results.result import result_schema as result_schema
+
+_HOMES = {
+    "CatalogueMatch": "cylx.results.result",
+    "Measured": "cylx.results.result",
+    "Numbered": "cylx.results.result",
+    "RejectedCylinder": "cylx.results.rejected",
+    "Rejections": "cylx.results.rejected",
+    "Result": "cylx.results.result",
+    "ResultCylinder": "cylx.results.result",
+    "SceneScale": "cylx.results.result",
+    "Stage": "cylx.results.result",
+    "Uncertainty": "cylx.results.result",
+    "rejections_schema": "cylx.results.rejected",
+    "result_schema": "cylx.results.result",
+}
+
+__all__ = sorted(_HOMES)  # noqa: PLE0605  (the names are those above)
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'cylx.results' has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

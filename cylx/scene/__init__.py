@@ -1,0 +1,27 @@
+"""What a cloud says of itself: its frame, its noise, and what a configuration means for it."""
+
+from cylx.scene.frame import canonical_order, cell_cube, check_usable, make_frame, measure_scene
+from cylx.scene.noise import Patches, measure_surface
+from cylx.scene.noise_variation import noise_by_place, noise_by_size
+from cylx.scene.priors import catalogue_of, known_of, out_of_range, radius_range
+from cylx.scene.resolve import resolve, thinnest
+from cylx.scene.selection import select
+
+__all__ = [
+    "Patches",
+    "canonical_order",
+    "catalogue_of",
+    "cell_cube",
+    "check_usable",
+    "known_of",
+    "make_frame",
+    "measure_scene",
+    "measure_surface",
+    "noise_by_place",
+    "noise_by_size",
+    "out_of_range",
+    "radius_range",
+    "resolve",
+    "select",
+    "thinnest",
+]
