@@ -149,9 +149,8 @@ def file_graph(sources):
         found = set()
         for _, other, name in imports(ast.parse(source)):
             inner = f"{other}.{name}"
-            found.add(
-                inner if name is not None and inner in sources and not re_exported(sources[other], inner) else other
-            )
+            is_file = name is not None and inner in sources and not re_exported(sources.get(other, ""), inner)
+            found.add(inner if is_file else other)
         graph[module] = found & set(sources) - {module}
     return graph
 

@@ -7,7 +7,7 @@
 | `overwrite_option` | `--overwrite` | `overwrite`, a bool |
 | `json_option` | `--json` | `as_json`, a bool |
 | `debug_option` | `--debug` | nothing |
-| `selecting` in `selecting.py` | `--crop --voxel --every --classes --scan` | `selection`, a `Selection` |
+| `selecting` in `selection.py` | `--crop --voxel --every --classes --scan` | `selection`, a `Selection` |
 
 `complete_files` lets the shell complete the file names of an argument or option.
 """

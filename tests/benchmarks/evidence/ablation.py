@@ -1,7 +1,8 @@
 """Run the pipeline without each term of the evidence, on scenes that the weights were not fitted to.
 
-Each term is taken out of `cylx.evidence.weights.TERMS`, and the others get the weights that were fitted without it, from
-the file that `fit.py --ablation FILE` writes. What that costs is counted end to end: cylinders missed, and false ones.
+Each term is taken out of `cylx.evidence.weights.TERMS`, and the others get the weights that were fitted without it,
+from the file that `fit.py --ablation FILE` writes. What that costs is counted end to end: cylinders missed, and false
+ones.
 """
 
 import argparse
