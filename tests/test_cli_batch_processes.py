@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from cylx import synthetic
-from cylx.cli.batch.batch import memory, workers
+from cylx.cli.batch import memory, workers
 from cylx.cli.batch.workers import Lost, Workers
 from cylx.io import temporary_beside, write_cloud
 

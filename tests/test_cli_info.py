@@ -120,7 +120,7 @@ def test_memory_that_may_not_suffice_is_told_of(run_cylx, tmp_path, scene, monke
 
 
 def test_every_warning_is_told_of():
-    source = (ROOT / "cylx" / "cautions.py").read_text(encoding="utf-8")
+    source = (ROOT / "cylx" / "scene" / "cautions.py").read_text(encoding="utf-8")
     source += (ROOT / "cylx" / "cli" / "info.py").read_text(encoding="utf-8")
     kinds = set(re.findall(r'(?:Caution\(|kind, remedy = )"(\w+)"', source))
     page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")

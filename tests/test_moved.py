@@ -30,7 +30,7 @@ def test_an_old_name_leads_to_the_new_module_and_warns(old, new):
 
 
 def test_what_was_never_there_is_not_found():
-    with pytest.raises(ModuleNotFoundError, match="cylx.nothing"):
+    with pytest.raises(ModuleNotFoundError, match=r"cylx\.nothing"):
         import_module("cylx.nothing")
 
 

@@ -10,7 +10,8 @@ from cylx.api import extract
 from cylx.config import Config, load_config
 from cylx.evaluation import Tolerances, compare
 from cylx.geometry.lines import are_along
-from cylx.pipeline import extract_cylinders, turns
+from cylx.pipeline import extract_cylinders
+from cylx.pipeline import rounds as turns
 from cylx.records import PointCloud, Segment
 from cylx.results import Result
 from cylx.synthetic import single

@@ -18,7 +18,6 @@ from cylx.config.layers import Layer, file_layer, merge, nested, override_layer,
 from cylx.config.sections import (
     AveragingConfig,
     CandidatesConfig,
-    CatalogueEntry,
     ClusteringConfig,
     EllipsesConfig,
     SceneConfig,
@@ -27,26 +26,6 @@ from cylx.config.sections import (
     VerificationConfig,
 )
 from cylx.errors import ConfigError
-
-__all__ = [
-    "AveragingConfig",
-    "CandidatesConfig",
-    "CatalogueEntry",
-    "ClusteringConfig",
-    "Config",
-    "EllipsesConfig",
-    "JinConfig",
-    "LineFitConfig",
-    "MsacConfig",
-    "SceneConfig",
-    "Section",
-    "SlicingConfig",
-    "TranConfig",
-    "VerificationConfig",
-    "check_tolerance",
-    "load_config",
-    "preset_names",
-]
 
 
 class Config(Section):

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from cylx.geometry.numerics import median_of_positive, sort_in_place
 
 FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 ARC_BINS = 24
 LEAST = 15
