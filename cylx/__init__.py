@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from cylx.records import CylinderFit as CylinderFit
     from cylx.records import Extraction as Extraction
     from cylx.records import PointCloud as PointCloud
-    from cylx.records import Rejection as Rejection
+    from cylx.records import RejectedCylinder as RejectedCylinder
     from cylx.report import plot_radii as plot_radii
     from cylx.report import plot_residuals as plot_residuals
     from cylx.report import plot_scene as plot_scene
@@ -42,7 +42,7 @@ _HOMES = {
     "CylxError": "cylx.errors",
     "Extraction": "cylx.records",
     "PointCloud": "cylx.records",
-    "Rejection": "cylx.records",
+    "RejectedCylinder": "cylx.records",
     "Result": "cylx.results",
     "compare": "cylx.evaluation",
     "evaluate": "cylx.evaluation",

@@ -20,7 +20,7 @@ from cylx.geometry.cylinder import Cylinder
 from cylx.geometry.ellipse import Ellipse
 from cylx.geometry.plane import Plane
 from cylx.io import write_annotated
-from cylx.optional import open3d as open3d_door
+from cylx.optional import open3d as open3d_file
 from cylx.records import EllipseFit
 from cylx.results import Result, result_schema
 from cylx.synthetic import single
@@ -301,7 +301,7 @@ def test_without_open3d_those_with_normals_say_so(monkeypatch, can, found_in_can
     def fail():
         raise ImportError("libgone.so: cannot open shared object file")
 
-    monkeypatch.setattr(open3d_door, "import_open3d", fail)
+    monkeypatch.setattr(open3d_file, "import_open3d", fail)
     if method not in NORMALS:
         assert_same(extract(can.points, method=method, max_cylinders=1), expected)
         return

@@ -10,8 +10,8 @@ from cylx.api import extract
 from cylx.config import Config
 from cylx.fits.nominal_radius import Catalogue
 from cylx.geometry.cells import Cells
-from cylx.geometry.cylinder import axis_frame
-from cylx.records import Ground, Noise, Segment
+from cylx.geometry.cylinder import axis_basis
+from cylx.records import IndexedCloud, Noise, Segment
 from cylx.results import Result, result_schema
 from cylx.scene import make_frame
 from cylx.stages.averaging import finish, inflation
@@ -149,15 +149,15 @@ def test_what_has_no_covariance_has_no_match(arc):
 def ground_of(points, noise):
     frame, _ = make_frame(points, Config())
     known = Noise(np.ones(1), np.array([noise / frame.spacing]))
-    return Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), known), frame
+    return IndexedCloud(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), known), frame
 
 
-def last_fit(ground, frame, catalogue=None, inflated=1.0):
+def last_fit(indexed, frame, catalogue=None, inflated=1.0):
     """Finish an upright cylinder about the origin; give choice, model and inflated covariance in scene units."""
     model = np.concatenate([-frame.origin, [0, 0, frame.spacing], [1.0]]) / frame.spacing
     if catalogue is not None:
         catalogue = Catalogue(*(tuple(x / frame.spacing for x in part) for part in catalogue))
-    fit = finish(Segment(model, 2.0 / frame.spacing, 0.0), ground, None, catalogue, inflated=inflated)
+    fit = finish(Segment(model, 2.0 / frame.spacing, 0.0), indexed, None, catalogue, inflated=inflated)
     units = np.array([frame.spacing, frame.spacing, 1.0, 1.0, frame.spacing])
     point, radius = fit.model[:3] * frame.spacing + frame.origin, fit.model[6] * frame.spacing
     covariance = fit.covariance * np.outer(units, units) * inflated
@@ -166,7 +166,7 @@ def last_fit(ground, frame, catalogue=None, inflated=1.0):
 
 def error_of(model, radius):
     """Give the error against an upright cylinder about the origin, as the covariance has it."""
-    frame, direction = np.array(axis_frame(model[3:6])), model[3:6]
+    frame, direction = np.array(axis_basis(model[3:6])), model[3:6]
     along = np.array([0, 0, 1.0]) / direction[2]
     away = -model[:3] + (model[:3] @ direction) * along
     return np.array([*(frame @ away), *(frame @ (along - direction)), radius - model[6]])
@@ -178,9 +178,9 @@ def test_of_an_arc_the_axis_is_several_times_more_certain_and_rightly_so():
     for seed in range(25):
         radius = 1.0 + tolerance * rng.standard_normal()
         points = radius * np.array(single(points=1500, sigma=0.01, theta_deg=90, seed=seed).points)
-        ground = ground_of(points, 0.01)
-        _, free, covariance = last_fit(*ground)
-        choice, drawn, smaller = last_fit(*ground, ((0.9, 1.0), (tolerance, tolerance)))
+        indexed = ground_of(points, 0.01)
+        _, free, covariance = last_fit(*indexed)
+        choice, drawn, smaller = last_fit(*indexed, ((0.9, 1.0), (tolerance, tolerance)))
         assert choice.entry == 1
         if choice.decision != "snapped":
             assert np.array_equal(drawn, free)
@@ -199,10 +199,10 @@ def test_of_an_arc_the_axis_is_several_times_more_certain_and_rightly_so():
 def test_what_is_no_perfect_cylinder_keeps_its_robust_fit():
     points = np.array(single(points=3000, sigma=0.002, seed=5).points)
     points[:, :2] *= [1.01, 0.99]  # an oval
-    ground, lack, tolerance = ground_of(points, 0.002), 20.0, 5e-4
-    _, free, before = last_fit(*ground, inflated=lack)
+    indexed, lack, tolerance = ground_of(points, 0.002), 20.0, 5e-4
+    _, free, before = last_fit(*indexed, inflated=lack)
     nominal = free[6] + 2 * tolerance
-    choice, drawn, after = last_fit(*ground, ((nominal, 1.2), (tolerance, tolerance)), inflated=lack)
+    choice, drawn, after = last_fit(*indexed, ((nominal, 1.2), (tolerance, tolerance)), inflated=lack)
     assert choice.decision == "snapped"
     assert free[6] < drawn[6] < nominal
     # the robust fit is moved by just what its covariance says
@@ -218,8 +218,8 @@ def test_a_lack_of_fit_inflates_from_where_it_is_none_by_chance():
 
 
 def test_the_structure_of_an_object_makes_its_radius_less_certain():
-    ground = ground_of(np.array(single(points=2000, sigma=0.01, theta_deg=90, seed=2).points), 0.01)
-    sure, unsure = (last_fit(*ground, ((1.0,), (1e-3,)), inflated=inflated)[0] for inflated in (1.0, 9.0))
+    indexed = ground_of(np.array(single(points=2000, sigma=0.01, theta_deg=90, seed=2).points), 0.01)
+    sure, unsure = (last_fit(*indexed, ((1.0,), (1e-3,)), inflated=inflated)[0] for inflated in (1.0, 9.0))
     assert unsure.deviation == pytest.approx(3 * sure.deviation, rel=1e-6)
     assert unsure.ratio < sure.ratio
 

@@ -12,12 +12,12 @@ import pytest
 from conftest import POINTS
 from test_cli_extract import on_a_terminal
 
-from cylx.cli.batch.many import Many
 from cylx.cli.batch.memory import memory_available
+from cylx.cli.batch.options import BatchOptions
 from cylx.cli.batch.scans import find_scans
 from cylx.cli.batch.summary import COLUMNS, table_text
 from cylx.cli.options.batch import Processes
-from cylx.cli.terminal.display import Conversation
+from cylx.cli.terminal.display import Messages
 from cylx.errors import InputError
 from cylx.io import expected_points, remove_leftovers, temporary_beside
 
@@ -474,9 +474,9 @@ def test_one_scan_is_done_here_whatever_the_jobs(run_cylx, scans, pipeline):
     [(None, 1e9, None), (3, 1e6, 3), (9, 1e9, 4), (0, 0.9e9, 3), (0, 1e5, 1), (0, None, 4)],
 )
 def test_jobs_are_as_many_as_there_is_room_for(monkeypatch, jobs, available, processes):
-    monkeypatch.setattr("cylx.cli.batch.many.memory_available", lambda: available)
-    monkeypatch.setattr("cylx.cli.batch.many.cores", lambda: 8)
-    assert Many(None, False, jobs, False, None).processes(list("abcd")) == processes
+    monkeypatch.setattr("cylx.cli.batch.options.memory_available", lambda: available)
+    monkeypatch.setattr("cylx.cli.batch.options.cores", lambda: 8)
+    assert BatchOptions(None, False, jobs, False, None).processes(list("abcd")) == processes
     assert Processes().convert("auto", None, None) == 0
 
 
@@ -534,12 +534,12 @@ def test_points_are_expected_by_header_or_size(tmp_path, content, points):
 def test_progress_is_shown_on_a_terminal(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
 
-    def show(talk):
-        with talk.counting(5) as advance:
+    def show(messages):
+        with messages.counting(5) as advance:
             advance()
-            talk.say("a line in between")
+            messages.say("a line in between")
 
-    shown = on_a_terminal(lambda: show(Conversation()))
+    shown = on_a_terminal(lambda: show(Messages()))
     assert "1/5" in shown
     assert "a line in between" in shown
-    assert "1/5" not in on_a_terminal(lambda: show(Conversation(quiet=True)))
+    assert "1/5" not in on_a_terminal(lambda: show(Messages(quiet=True)))

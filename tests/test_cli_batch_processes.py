@@ -114,8 +114,8 @@ def test_what_was_killed_goes_on_to_the_same_bytes(place, whole, started):
 # the processes themselves
 
 
-def outcome(tasks, most=2, bury=lambda process: None, needs=None):
-    return dict(Workers(eval, most, bury).run(tasks, needs or [0] * len(tasks)))
+def outcome(tasks, most=2, after_death=lambda process: None, needs=None):
+    return dict(Workers(eval, most, after_death).run(tasks, needs or [0] * len(tasks)))
 
 
 @POSIX
@@ -124,7 +124,7 @@ def test_one_that_dies_takes_nothing_with_it(tmp_path):
         f"__import__('cylx.io').io.temporary_beside(__import__('pathlib').Path({str(tmp_path)!r}, 'x'), '.tmp').touch()"
     )
     dead = []
-    answers = outcome(["1 + 1", f"[{leave}, {KILL}]", "2 + 2", KILL, "3 + 3"], bury=dead.append)
+    answers = outcome(["1 + 1", f"[{leave}, {KILL}]", "2 + 2", KILL, "3 + 3"], after_death=dead.append)
     assert answers == {0: 2, 1: Lost(-9), 2: 4, 3: Lost(-9), 4: 6}
     assert len(dead) == 2
     (left,) = tmp_path.iterdir()

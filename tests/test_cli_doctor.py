@@ -7,20 +7,20 @@ from importlib.metadata import metadata, requires
 
 import pytest
 
-from cylx.cli import doctor as diagnosis
+from cylx.cli import doctor
 from cylx.cli.doctor import Check
 
 
 @pytest.fixture
 def bare(monkeypatch):
     """Look at one extra only, since they take seconds to import."""
-    monkeypatch.setattr(diagnosis, "extras_there_are", lambda: {"plots"})
+    monkeypatch.setattr(doctor, "extras_there_are", lambda: {"plots"})
 
 
 @pytest.fixture
 def well(monkeypatch, bare):
     """Leave out the extraction, which other tests do."""
-    monkeypatch.setattr(diagnosis, "check_extraction", lambda observer: Check("extraction", "ok", "made by hand"))
+    monkeypatch.setattr(doctor, "check_extraction", lambda observer: Check("extraction", "ok", "made by hand"))
 
 
 def test_here_all_is_well(run_cylx, bare):
@@ -43,9 +43,9 @@ def test_it_is_shown_as_a_table(run_cylx, well):
 
 
 def test_a_missing_extra_is_no_fault(run_cylx, well, monkeypatch):
-    monkeypatch.setattr(diagnosis, "extras_there_are", lambda: {"mesh"})
+    monkeypatch.setattr(doctor, "extras_there_are", lambda: {"mesh"})
     monkeypatch.setitem(sys.modules, "trimesh", None)
-    monkeypatch.setattr(diagnosis, "_version", lambda name: None if name == "trimesh" else "1.0")
+    monkeypatch.setattr(doctor, "_version", lambda name: None if name == "trimesh" else "1.0")
     done = run_cylx("doctor", "--json")
     (check,) = (check for check in json.loads(done.stdout)["checks"] if check["name"] == "trimesh")
     assert done.exit_code == 0
@@ -54,7 +54,7 @@ def test_a_missing_extra_is_no_fault(run_cylx, well, monkeypatch):
 
 
 def test_a_needed_package_that_is_missing_is_one(run_cylx, well, monkeypatch):
-    monkeypatch.setattr(diagnosis, "check_open3d", lambda: Check("open3d", "broken", "does not load", "mend it"))
+    monkeypatch.setattr(doctor, "check_open3d", lambda: Check("open3d", "broken", "does not load", "mend it"))
     done = run_cylx("doctor")
     assert done.exit_code == 1
     assert re.search(r"open3d +broken +does not load +mend it", done.stdout)
@@ -65,7 +65,7 @@ def test_a_library_that_fails_when_it_is_imported_is_broken(tmp_path, monkeypatc
     (tmp_path / "pye57.py").write_text("raise OSError('libxerces-c.so: cannot open\\nfor some reason')")
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "pye57", raising=False)
-    check = diagnosis.check_extra("pye57")
+    check = doctor.check_extra("pye57")
     assert check.state == "broken"
     assert check.detail.endswith(", but libxerces-c.so: cannot open")
     assert not check.needed
@@ -73,9 +73,9 @@ def test_a_library_that_fails_when_it_is_imported_is_broken(tmp_path, monkeypatc
 
 def test_kernels_that_cannot_be_kept_are_told_of(monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    assert diagnosis.check_kernels().detail.endswith(f"NUMBA_CACHE_DIR={tmp_path}")
+    assert doctor.check_kernels().detail.endswith(f"NUMBA_CACHE_DIR={tmp_path}")
     monkeypatch.setattr("os.access", lambda *_: False)
-    check = diagnosis.check_kernels()
+    check = doctor.check_kernels()
     assert (check.state, check.needed) == ("broken", False)
     assert check.remedy == "set NUMBA_CACHE_DIR to a folder that can be written to"
 
@@ -83,7 +83,7 @@ def test_kernels_that_cannot_be_kept_are_told_of(monkeypatch, tmp_path):
         raise RuntimeError("cannot cache function 'find_cell': no locator available")
 
     monkeypatch.setattr("cylx.pipeline.warmup.kernel_folder", nowhere)
-    check = diagnosis.check_kernels()
+    check = doctor.check_kernels()
     assert (check.state, check.needed) == ("broken", True)
     assert check.detail.startswith("cannot cache function 'find_cell': no locator available; ")
 
@@ -97,8 +97,8 @@ def test_kernels_that_cannot_be_kept_are_told_of(monkeypatch, tmp_path):
     ],
 )
 def test_memory(free, detail, remedy, monkeypatch):
-    monkeypatch.setattr(diagnosis, "free_memory", lambda: free)
-    check = diagnosis.check_machine()
+    monkeypatch.setattr(doctor, "free_memory", lambda: free)
+    check = doctor.check_machine()
     assert (check.state, check.remedy) == ("ok", remedy)
     assert check.detail.endswith(detail)
 
@@ -115,7 +115,7 @@ def test_a_wrong_answer_is_a_fault(radii, said, monkeypatch, make_extraction):
     (fit, *_) = found.cylinders
     fits = [replace(fit, cylinder=Cylinder((0, 0, 0), (0, 0, 1), radius, 4.0)) for radius in radii]
     monkeypatch.setattr("cylx.api.extract", lambda *_, **__: replace(found, cylinders=tuple(fits)))
-    check = diagnosis.check_extraction()
+    check = doctor.check_extraction()
     assert (check.state, check.needed) == ("broken", True)
     assert check.detail.endswith(said)
 
@@ -125,13 +125,13 @@ def test_a_crash_is_a_fault_and_no_crash(monkeypatch):
         raise ZeroDivisionError("float division")
 
     monkeypatch.setattr("cylx.api.extract", fail)
-    assert diagnosis.check_extraction().detail == "ZeroDivisionError: float division"
+    assert doctor.check_extraction().detail == "ZeroDivisionError: float division"
 
 
 def test_it_checks_what_the_package_needs_and_offers():
     needs = [re.match(r"[\w-]+", line)[0].lower() for line in requires("cylx") if "extra ==" not in line]
     assert {name for name in needs if "open3d" not in name and "libusb" not in name} == {
-        name.lower() for name in diagnosis.NEEDED
+        name.lower() for name in doctor.NEEDED
     }
     offered = set(metadata("cylx").get_all("Provides-Extra")) - {"test", "lint", "bench", "docs"}
-    assert offered <= {extra for extra, _ in diagnosis.OPTIONAL.values()}
+    assert offered <= {extra for extra, _ in doctor.OPTIONAL.values()}

@@ -12,7 +12,7 @@ from plyfile import PlyData
 import cylx.io
 from cylx.cli.batch.jobs import plan_jobs
 from cylx.cli.options.configuration import METHODS
-from cylx.cli.terminal.display import Conversation
+from cylx.cli.terminal.display import Messages
 from cylx.config import load_config
 from cylx.errors import InputError, OutputError, UsageError
 from cylx.results import rejections_schema, result_schema
@@ -410,10 +410,10 @@ def test_the_same_name_in_two_folders_is_fine(run_cylx, scan, tmp_path):
 def test_progress_is_shown_on_a_terminal_only(run_cylx, scan, monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     assert "\x1b" not in run_cylx("extract", scan).stderr
-    shown = on_a_terminal(lambda: show_progress(Conversation()))
+    shown = on_a_terminal(lambda: show_progress(Messages()))
     assert "compiling (the first time only)" in shown
     assert "1/2" in shown
-    assert on_a_terminal(lambda: show_progress(Conversation(quiet=True))) == ""
+    assert on_a_terminal(lambda: show_progress(Messages(quiet=True))) == ""
 
 
 # methods
@@ -477,8 +477,8 @@ def test_a_method_that_there_is_not_or_that_cannot_do_it_is_refused(run_cylx, sc
     assert names(scan.parent) == ["scan.xyz"]
 
 
-def show_progress(talk):
-    with talk.progress() as observer:
+def show_progress(messages):
+    with messages.progress() as observer:
         observer.stage_started("compiling", None)
         observer.stage_finished("compiling", 1.0)
         observer.stage_started("slicing", 2)

@@ -13,13 +13,11 @@ from docs_tables import PACKAGE, TABLES, TOLD, commands, config_keys, config_sec
 
 from cylx import errors
 from cylx.config import Config
-from cylx.evidence import weights as evidence
+from cylx.evidence import weights as evidence_weights
 from cylx.io import annotated
-from cylx.pipeline import candidates as sources
-from cylx.pipeline import rounds as turns
+from cylx.pipeline import candidates, rounds
 from cylx.records import Scene
-from cylx.scene import priors as limits
-from cylx.scene import resolve
+from cylx.scene import priors, resolve
 from cylx.stages import averaging, clustering, curvature, local_slices, verification
 
 ROOT = PACKAGE.parent
@@ -188,11 +186,11 @@ def test_every_stage_is_told_of_with_its_reasons():
     rejected = part(page, "## The rejected")
     rows = rows_of(part(page, "## The stages"))[1:]
     told = {row[0].strip("`"): row[3] + (rejected if "](#the-rejected)" in row[3] else "") for row in rows}
-    source = "".join(inspect.getsource(module) for module in (sources, turns, curvature, clustering))
+    source = "".join(inspect.getsource(module) for module in (candidates, rounds, curvature, clustering))
     assert set(told) == set(re.findall(r'(?:\.report|StageReport)\("([a-z ]+)"', source))
     reasons = {("curvature", reason) for reason in curvature.OUTCOMES[:-1]}
     reasons |= {("local slicing", reason) for reason in local_slices.COUNTS[1:]}
-    reasons |= {("verification", turns.FOUND_BEFORE)}
+    reasons |= {("verification", rounds.FOUND_BEFORE)}
     for golden in (ROOT / "sample_data" / "golden").glob("*.json"):
         for stage in json.loads(golden.read_text(encoding="utf-8"))["stages"]:
             reasons |= {(stage["name"], reason) for reason in stage["rejected"]}
@@ -201,10 +199,10 @@ def test_every_stage_is_told_of_with_its_reasons():
 
 def test_every_reason_of_a_rejection_is_told_of():
     told = part(read("docs/json-format.md"), "## The rejected")
-    reasons = {term.reason for term in evidence.TERMS}
+    reasons = {term.reason for term in evidence_weights.TERMS}
     reasons |= set(re.findall(r'"([a-z _]+)": ', inspect.getsource(verification._refusal)))
     ours = r'"([a-z_ ]+ (?:range|one|max_cylinders))"'
-    for module, found in ((averaging, r'return "([a-z ]+)"'), (turns, ours), (limits, ours)):
+    for module, found in ((averaging, r'return "([a-z ]+)"'), (rounds, ours), (priors, ours)):
         reasons |= set(re.findall(found, inspect.getsource(module)))
     assert {"agreement", "bulge", "drifted away", "axis out of range", "beyond max_cylinders"} <= reasons
     assert [reason for reason in sorted(reasons) if f"`{reason}`" not in told] == []

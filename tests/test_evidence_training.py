@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cylx.evaluation import evaluate
-from cylx.evidence import weights as evidence
+from cylx.evidence import weights as evidence_weights
 from cylx.geometry.cylinder import Cylinder, cylinder_coordinates
 from cylx.synthetic import OTHER_SURFACE
 from cylx.synthetic.surfaces import Box, Mantle, Sphere, Wall
@@ -359,9 +359,9 @@ def test_rows_of_a_scene_hold_what_the_evidence_weighs(tmp_path, monkeypatch, ca
     for line in lines:
         assert (line["cylinder"] is None) == (line["label"] in {labels.FALSE, labels.AMBIGUOUS})
         # what counts as a point of a cylinder differs a little before and after all of them are known
-        assert evidence.weigh(line["measures"])[0] == pytest.approx(line["confidence"], abs=0.05)
+        assert evidence_weights.weigh(line["measures"])[0] == pytest.approx(line["confidence"], abs=0.05)
     rows = fit.table_of(lines)
-    assert rows.terms.shape == (len(rows.true), len(evidence.TERMS))
+    assert rows.terms.shape == (len(rows.true), len(evidence_weights.TERMS))
     capsys.readouterr()
     monkeypatch.setattr(sys, "argv", [*command, "--append"])
     assert collect.main() == 0
@@ -380,9 +380,11 @@ def test_the_program_prints_what_can_be_pasted(tmp_path, monkeypatch, capsys):
     assert "Brier score" in out
     laws = json.loads(weights.read_text(encoding="utf-8"))
     assert f"BIAS = {laws['all']['bias']:.3f}" in out
-    for term in evidence.TERMS:
+    for term in evidence_weights.TERMS:
         assert f'Term("{term.reason}", {laws["all"]["weights"][term.reason]:.3f}' in out
-        assert set(laws["without"][term.reason]["weights"]) == {t.reason for t in evidence.TERMS} - {term.reason}
+        assert set(laws["without"][term.reason]["weights"]) == {t.reason for t in evidence_weights.TERMS} - {
+            term.reason
+        }
     monkeypatch.setattr(sys, "argv", ["fit.py", str(path), str(path)])
     with pytest.raises(SystemExit, match="in another file"):
         fit.main()
@@ -396,15 +398,15 @@ def test_a_picture_is_drawn(tmp_path):
 
 
 def test_the_evidence_is_itself_again_after_an_ablation():
-    before = evidence.BIAS, evidence.TERMS
-    names = [term.reason for term in evidence.TERMS]
+    before = evidence_weights.BIAS, evidence_weights.TERMS
+    names = [term.reason for term in evidence_weights.TERMS]
     law = {"bias": -1.0, "weights": dict.fromkeys(names[1:], 0.5)}
     measures = synthetic_line(np.random.default_rng(0), 0)["measures"]
     with ablation.weighed_by(law):
-        assert [(term.reason, term.weight) for term in evidence.TERMS] == [(name, 0.5) for name in names[1:]]
-        odds = -1.0 + 0.5 * sum(term.value(measures) for term in evidence.TERMS)
-        assert evidence.weigh(measures)[0] == pytest.approx(1 / (1 + np.exp(-odds)))
-    assert before == (evidence.BIAS, evidence.TERMS)
+        assert [(term.reason, term.weight) for term in evidence_weights.TERMS] == [(name, 0.5) for name in names[1:]]
+        odds = -1.0 + 0.5 * sum(term.value(measures) for term in evidence_weights.TERMS)
+        assert evidence_weights.weigh(measures)[0] == pytest.approx(1 / (1 + np.exp(-odds)))
+    assert before == (evidence_weights.BIAS, evidence_weights.TERMS)
     with pytest.raises(SystemExit, match="no term magic"), ablation.weighed_by({"bias": 0, "weights": {"magic": 1}}):
         pass
 

@@ -5,7 +5,7 @@ import pytest
 
 import cylx
 from cylx.errors import InputError
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.synthetic.surfaces import Mantle
 
 
@@ -19,7 +19,7 @@ def pipe(rng, *, points=500, radius=1.0, height=3.0, arc_deg=200.0, sigma=0.01):
 def errors(fit, shape):
     """Give the five errors that the covariance is of."""
     found = fit.cylinder
-    frame = np.array(axis_frame(found.direction))
+    frame = np.array(axis_basis(found.direction))
     away = shape.point - found.point
     away = away - shape.direction * (away @ found.direction) / (shape.direction @ found.direction)
     return np.concatenate([frame @ away, frame @ shape.direction, [shape.radius - found.radius]])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from cylx.fits.cramer_rao import covariance_bound, mean_errors_at_bound, mean_length, outlier_information
-from cylx.geometry.cylinder import axis_frame
+from cylx.geometry.cylinder import axis_basis
 from cylx.synthetic import single
 
 laws = settings(max_examples=40, deadline=None)
@@ -197,7 +197,7 @@ def test_mean_angles_are_what_another_program_found(theta_deg, height, sigma, si
 def test_least_squares_scatter_as_the_bound_says(theta_deg):
     points, height, sigma, trials = 500, 4.0, 0.01, 60
     theta = math.radians(theta_deg)
-    first, second = axis_frame(np.array([0.0, 0.0, 1.0]))  # the arc of the scene begins at the first one
+    first, second = axis_basis(np.array([0.0, 0.0, 1.0]))  # the arc of the scene begins at the first one
     view = math.cos(theta / 2) * first + math.sin(theta / 2) * second
     across = math.cos(theta / 2) * second - math.sin(theta / 2) * first
 

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cylx.fits.conditioning import given_radius
 from cylx.fits.likelihood import Prior, fit_mixture
-from cylx.geometry.cylinder import axis_frame
+from cylx.geometry.cylinder import axis_basis
 from cylx.synthetic import single
 
 
@@ -29,7 +29,7 @@ def test_it_is_the_product_of_two_gaussians(seed, away, deviation):
     precision = np.linalg.inv(covariance) + np.outer(radius, radius) / deviation**2
     assert left == pytest.approx(np.linalg.inv(precision), rel=1e-6, abs=1e-12)
     step = np.linalg.solve(precision, radius * away / deviation**2)
-    frame = np.array(axis_frame(model[3:6]))
+    frame = np.array(axis_basis(model[3:6]))
     assert frame @ (moved[:3] - model[:3]) == pytest.approx(step[:2], abs=1e-9)
     assert frame @ (moved[3:6] / (moved[3:6] @ model[3:6]) - model[3:6]) == pytest.approx(step[2:4], abs=1e-9)
     assert moved[6] - model[6] == pytest.approx(step[4], abs=1e-12)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from cylx.geometry.cylinder import (
     Cylinder,
-    axis_frame,
+    axis_basis,
     canonical_direction,
     cylinder_coordinates,
     surface_distances,
@@ -83,7 +83,7 @@ def test_a_cylinder_keeps_its_own_copy():
 @given(seeds)
 def test_a_frame_is_right_handed_and_unit(seed):
     direction = random_directions(1, np.random.default_rng(seed))[0]
-    frame = np.stack([*axis_frame(direction), direction])
+    frame = np.stack([*axis_basis(direction), direction])
     assert np.allclose(frame @ frame.T, np.eye(3), rtol=0, atol=1e-14)
     assert np.linalg.det(frame) > 0
 
@@ -104,7 +104,7 @@ def test_outside_is_positive_and_heights_and_angles_turn_to_the_right():
 def test_coordinates_build_the_points_again(seed):
     _, shape, points, _ = draw(seed)
     heights, distances, angles = cylinder_coordinates(points, shape.point, shape.direction)
-    first, second = axis_frame(shape.direction)
+    first, second = axis_basis(shape.direction)
     again = (
         shape.point
         + heights[:, None] * shape.direction

@@ -12,7 +12,7 @@ from cylx.fits.robust import (
     SHARP,
     TUKEY,
     TUKEY_SPREAD,
-    Kernel,
+    WeightSchedule,
     candidate_quality,
     fit_cylinder,
     move_to_foot,
@@ -25,8 +25,8 @@ laws = settings(max_examples=30, deadline=None)
 UNIT = np.array([0.0, 0, 0, 0, 0, 1, 1])
 
 
-def kernel(sigma):
-    return Kernel(max(10.0 * sigma, 0.05), 3.0 * sigma, 1.0, TUKEY * TUKEY_SPREAD)
+def schedule(sigma):
+    return WeightSchedule(max(10.0 * sigma, 0.05), 3.0 * sigma, 1.0, TUKEY * TUKEY_SPREAD)
 
 
 def sample(rng, n, theta_deg=360.0, height=3.0, sigma=0.01):
@@ -45,7 +45,7 @@ def rough(rng, size=0.05):
 
 
 def fitted(points, start, sigma, low=-np.inf, high=np.inf, steps=60):
-    found = fit_cylinder(points, start, low=low, high=high, kernel=kernel(sigma), steps=steps)
+    found = fit_cylinder(points, start, low=low, high=high, schedule=schedule(sigma), steps=steps)
     assert found is not None
     return found
 
@@ -134,13 +134,13 @@ def test_the_fit_follows_motion_and_scale(seed, exponent):
     turn, shift = Rotation.from_quat(rng.standard_normal(4)).as_matrix(), scale * rng.standard_normal(3)
     one, spread = fitted(points, start, 0.02)
     moved = np.concatenate([scale * turn @ start[:3] + shift, turn @ start[3:6], [scale * start[6]]])
-    widths = kernel(0.02)
+    widths = schedule(0.02)
     other, spread_ = fit_cylinder(
         rng.permutation(scale * points @ turn.T + shift),
         moved,
         low=-np.inf,
         high=np.inf,
-        kernel=Kernel(scale * widths.start, scale * widths.floor, widths.decay, widths.tuning),
+        schedule=WeightSchedule(scale * widths.start, scale * widths.floor, widths.decay, widths.tuning),
         steps=60,
     )
     # the point may slide along the axis by as much as the steps of the two fits differ
@@ -194,18 +194,18 @@ def test_points_beyond_the_heights_do_not_take_part():
 @pytest.mark.parametrize("n", [0, 1, 7])
 def test_a_few_points_are_not_fitted(n):
     points = sample(np.random.default_rng(0), n)[0]
-    assert fit_cylinder(points, UNIT, low=-9, high=9, kernel=kernel(0.01), steps=20) is None
+    assert fit_cylinder(points, UNIT, low=-9, high=9, schedule=schedule(0.01), steps=20) is None
 
 
 def test_points_all_far_from_the_start_are_not_fitted():
     points = 5.0 * sample(np.random.default_rng(0), 200)[0]
-    assert fit_cylinder(points, UNIT, low=-99, high=99, kernel=kernel(0.01), steps=20) is None
+    assert fit_cylinder(points, UNIT, low=-99, high=99, schedule=schedule(0.01), steps=20) is None
 
 
 def test_points_on_one_ring_are_fitted_across_it_or_not_at_all():
     # nothing is known of the tilt of a ring but its own plane
     ring = np.column_stack([np.cos(np.arange(60)), np.sin(np.arange(60)), np.zeros(60)])
-    found = fit_cylinder(ring, UNIT, low=-9, high=9, kernel=kernel(0.01), steps=20)
+    found = fit_cylinder(ring, UNIT, low=-9, high=9, schedule=schedule(0.01), steps=20)
     assert found is None or np.allclose(deviations(found[0]), 0, atol=1e-6)
 
 

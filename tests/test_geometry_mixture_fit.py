@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.fits.residual_law import BINS, Law, estimate_law
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
-from cylx.geometry.cylinder import axis_frame
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
+from cylx.geometry.cylinder import axis_basis
 
 UNIT = np.array([0.0, 0, 0, 0, 0, 1, 1])
 CHI_5_95, CHI_2_95 = 11.07, 5.991
@@ -30,7 +30,7 @@ def fitted(points, start=UNIT, sigma=0.01, prior=None):
 
 def errors(fit, truth=UNIT):
     """Give how far the true cylinder is off, in the frame of the fit: two offsets, two tilts, radius."""
-    frame = np.array(axis_frame(fit.model[3:6]))
+    frame = np.array(axis_basis(fit.model[3:6]))
     direction = truth[3:6] * np.sign(truth[3:6] @ fit.model[3:6])
     direction = direction / (direction @ fit.model[3:6])
     away = truth[:3] - fit.model[:3]
@@ -104,8 +104,8 @@ def test_turned_moved_and_scaled_alike(seed, scale):
     assert np.abs(errors(other, expected)[[0, 1, 4]]).max() < 1e-6 * scale
     assert np.abs(errors(other, expected)[2:4]).max() < 1e-6
     units = np.array([scale, scale, 1, 1, scale])
-    frame = turn.apply(np.array(axis_frame(plain.model[3:6])))
-    mixing = np.array(axis_frame(other.model[3:6])) @ frame.T
+    frame = turn.apply(np.array(axis_basis(plain.model[3:6])))
+    mixing = np.array(axis_basis(other.model[3:6])) @ frame.T
     whole = np.zeros((5, 5))
     whole[:2, :2], whole[2:4, 2:4], whole[4, 4] = mixing, mixing, 1.0
     assert other.covariance == pytest.approx(
@@ -121,8 +121,8 @@ def test_a_neighbour_on_one_side_does_not_pull():
         # a wall that begins just outside the surface, on one side
         wall = np.column_stack([np.full(600, 1.05), rng.uniform(-0.2, 0.2, 600), rng.uniform(-1.5, 1.5, 600)])
         both = np.concatenate([points, wall + 0.01 * rng.standard_normal(wall.shape)])
-        kernel = Kernel(0.08, 0.03, 1.0, TUKEY * TUKEY_SPREAD)
-        robust, _ = fit_cylinder(both, UNIT, low=-2.0, high=2.0, kernel=kernel, steps=60)
+        schedule = WeightSchedule(0.08, 0.03, 1.0, TUKEY * TUKEY_SPREAD)
+        robust, _ = fit_cylinder(both, UNIT, low=-2.0, high=2.0, schedule=schedule, steps=60)
         alone = fitted(points)
         deviations = np.sqrt(np.diag(alone.covariance))
         shifts.append(np.abs(errors(fitted(both, robust)) - errors(alone)) / deviations)
@@ -178,8 +178,8 @@ def test_a_known_radius_wins_ten_times_at_a_right_angle():
         points, _, _ = sample(rng, 1000, theta_deg=90.0)
         one, other = fitted(points), fitted(points, prior=Prior(radius=1.0, radius_deviation=1e-6))
         # towards the viewer, which is along x, whatever the frame
-        free.append(errors(one)[:2] @ np.array(axis_frame(one.model[3:6]))[:, 0])
-        drawn.append(errors(other)[:2] @ np.array(axis_frame(other.model[3:6]))[:, 0])
+        free.append(errors(one)[:2] @ np.array(axis_basis(one.model[3:6]))[:, 0])
+        drawn.append(errors(other)[:2] @ np.array(axis_basis(other.model[3:6]))[:, 0])
         error = errors(other)[:2]
         held.append(error @ np.linalg.solve(other.covariance[:2, :2], error) < CHI_2_95)
         assert other.model[6] == pytest.approx(1.0, abs=1e-5)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.geometry.numerics import fill_frame, solve_in_place, symmetric_eigen
+from cylx.geometry.numerics import fill_basis, solve_in_place, symmetric_eigen
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=50, deadline=None)
@@ -105,7 +105,7 @@ DIRECTIONS = [
 def test_a_frame_is_right_handed_and_unit(direction):
     direction = direction / np.linalg.norm(direction)
     frame = np.empty((2, 3))
-    fill_frame(direction, frame)
+    fill_basis(direction, frame)
     whole = np.vstack([frame, direction])
     assert np.allclose(whole @ whole.T, np.eye(3), rtol=0, atol=1e-14)
     assert np.linalg.det(whole) > 0

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
-from cylx.records import Ground, Noise
+from cylx.records import IndexedCloud, Noise
 from cylx.records.clouds import ENOUGH_PATCHES, MOST_NOISE, cell_keys
 from cylx.scene import make_frame, noise_by_place
 from cylx.scene.noise_variation import AGREED
@@ -141,7 +141,7 @@ def ground_of(patches, cells=None, factor=1.0):
     """Give a ground that knows nothing but its noise: 0.1 usually, and in one cell, of the side 10, so many times."""
     known = {} if cells is None else {"side": 10.0, "cells": cell_keys(cells), "factors": np.full(len(cells), factor)}
     noise = Noise(np.array([1.0]), np.array([0.1]), **known, patches=patches)
-    return Ground(Cells(np.zeros((1, 3)), np.zeros(1, np.int64)), np.zeros(1), noise)
+    return IndexedCloud(Cells(np.zeros((1, 3)), np.zeros(1, np.int64)), np.zeros(1), noise)
 
 
 def patches_on(rng, model, half, count, times, size=0.2):
@@ -171,11 +171,11 @@ def test_a_cylinder_has_the_noise_of_the_patches_on_its_surface(seed, times):
         patches_on(rng, within, half, 50, 0.5 * times, 0.05),  # on a smaller one inside it
         patches_on(rng, model, half, 50, 9.0, 0.9),  # as large as itself: they show its curvature
     ]
-    ground = ground_of(rng.permutation(np.concatenate([own, *others])))
-    assert np.isclose(ground.noise_about(model, half), 0.1 * np.median(own[:, 4]))
+    indexed = ground_of(rng.permutation(np.concatenate([own, *others])))
+    assert np.isclose(indexed.noise_about(model, half), 0.1 * np.median(own[:, 4]))
     # beyond its ends there are none, and nobody knows better than what is usual
     model[:3] += (2.1 * half + 4 * model[6]) * model[3:6]
-    assert ground.noise_about(model, half) == pytest.approx(0.1)
+    assert indexed.noise_about(model, half) == pytest.approx(0.1)
 
 
 @laws
@@ -183,8 +183,8 @@ def test_a_cylinder_has_the_noise_of_the_patches_on_its_surface(seed, times):
 def test_no_surface_is_less_noisy_than_usual_or_many_times_more(seed):
     rng, model, half = drawn(seed)
     for times, expected in ((0.4, 1.0), (1.05, 1.0), (30.0, MOST_NOISE)):
-        ground = ground_of(patches_on(rng, model, half, 40, times))
-        assert np.isclose(ground.noise_about(model, half), 0.1 * expected)
+        indexed = ground_of(patches_on(rng, model, half, 40, times))
+        assert np.isclose(indexed.noise_about(model, half), 0.1 * expected)
 
 
 @pytest.mark.parametrize("count", [0, ENOUGH_PATCHES - 1])

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from cylx.config import Config, load_config
 from cylx.errors import InputError
-from cylx.geometry.cylinder import axis_frame, cylinder_coordinates, surface_distances
+from cylx.geometry.cylinder import axis_basis, cylinder_coordinates, surface_distances
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud, Source
 from cylx.results import Result
@@ -428,7 +428,7 @@ def test_uncertainties_hold_the_truth():
         scene = single(points=3000, sigma=0.01, p=0.2, sigma_o=0.03, theta_deg=(360.0, 150.0)[seed % 2], seed=seed)
         fit = extract_cylinders(PointCloud(scene.points), Config(max_cylinders=1)).cylinders[0]
         true, found = scene.cylinders[0].cylinder, fit.cylinder
-        frame = np.array(axis_frame(found.direction))
+        frame = np.array(axis_basis(found.direction))
         along = true.direction / (true.direction @ found.direction)
         away = true.point - found.point
         offset = frame @ (away - (away @ found.direction) * along)

@@ -16,13 +16,13 @@ import pytest
 
 import cylx
 from cylx.errors import UsageError
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.palette import cylinder_colors
 from cylx.records import PointCloud, Source
 from cylx.report import html_of, png_of
 from cylx.report.maps import EMPTY, unroll
 from cylx.report.page import json_for_script
-from cylx.report.page_data import facts_of
+from cylx.report.page_data import page_data_of
 from cylx.report.picture import outline
 from cylx.report.points import LEAST, STEPS, choose_points, original_colors, pack_labels, pack_residuals, quantise
 from cylx.results import Result
@@ -64,15 +64,15 @@ def hostile(make_extraction):
 
 
 def test_the_object_in_the_page_agrees_with_the_result(extraction):
-    facts = blob_of(html_of(extraction))
+    page_data = blob_of(html_of(extraction))
     result = Result.of(extraction).to_object()
     config = result.pop("config")
-    assert facts["result"] == result
-    assert f"seed: {config['seed']}" in facts["config"].splitlines()
-    assert (facts["fields"], facts["rejected_count"]) == (["x", "y", "z"], 1)
-    assert [one["reason"] for one in facts["rejected"]] == ["agreement"]
-    view = facts["view"]
-    assert (view["count"], view["total"], len(view["cylinders"]), len(facts["maps"])) == (24, 24, 2, 2)
+    assert page_data["result"] == result
+    assert f"seed: {config['seed']}" in page_data["config"].splitlines()
+    assert (page_data["fields"], page_data["rejected_count"]) == (["x", "y", "z"], 1)
+    assert [one["reason"] for one in page_data["rejected"]] == ["agreement"]
+    view = page_data["view"]
+    assert (view["count"], view["total"], len(view["cylinders"]), len(page_data["maps"])) == (24, 24, 2, 2)
     middle = np.array(view["low"]) + 0.5 * np.array(view["size"])
     fit = extraction.cylinders[1].cylinder
     assert view["cylinders"][1] == pytest.approx([*(fit.start - middle), *(fit.end - middle), 2.0])
@@ -80,7 +80,7 @@ def test_the_object_in_the_page_agrees_with_the_result(extraction):
 
 
 def test_the_points_in_the_page_are_those_of_the_cloud(extraction):
-    view = facts_of(extraction)["view"]
+    view = page_data_of(extraction)["view"]
     steps = unpacked(view["points"], "<u2").reshape(-1, 3)
     points = np.array(view["low"]) + steps / STEPS * np.array(view["size"])
     expected = extraction.cloud.points[np.lexsort(extraction.cloud.points.T)]
@@ -90,15 +90,15 @@ def test_the_points_in_the_page_are_those_of_the_cloud(extraction):
 
 
 def test_a_result_without_a_cylinder_has_a_page(make_extraction):
-    facts = blob_of(html_of(make_extraction(cylinders=0, rejected=0)))
-    assert (facts["result"]["cylinders"], facts["maps"], facts["rejected"]) == ([], [], [])
-    assert set(unpacked(facts["view"]["labels"], "u1")) == {255}
-    assert set(unpacked(facts["view"]["residuals"], "i1")) == {-128}
+    page_data = blob_of(html_of(make_extraction(cylinders=0, rejected=0)))
+    assert (page_data["result"]["cylinders"], page_data["maps"], page_data["rejected"]) == ([], [], [])
+    assert set(unpacked(page_data["view"]["labels"], "u1")) == {255}
+    assert set(unpacked(page_data["view"]["residuals"], "i1")) == {-128}
 
 
 def test_of_many_refused_ones_the_first_are_told_of(make_extraction):
-    facts = facts_of(make_extraction(rejected=70))
-    assert (len(facts["rejected"]), facts["rejected_count"]) == (50, 70)
+    page_data = page_data_of(make_extraction(rejected=70))
+    assert (len(page_data["rejected"]), page_data["rejected_count"]) == (50, 70)
 
 
 def test_the_same_result_gives_the_same_bytes(make_extraction):
@@ -191,7 +191,7 @@ def dented(depth=0.01, noise=0.001, count=40_000):
     """A slanted pipe of radius 0.5 and height 4, dented between 60° and 120° from its frame in its upper quarter."""
     rng = np.random.default_rng(5)
     pipe = Cylinder((10, 20, 30), (0.3, -0.2, 0.93), 0.5, 4.0)
-    across, along = axis_frame(pipe.direction)
+    across, along = axis_basis(pipe.direction)
     angles, heights = rng.uniform(-np.pi, np.pi, count), rng.uniform(-2, 2, count)
     inside = (np.abs(np.degrees(angles) - 90) < 30) & (heights > 1)
     residuals = rng.normal(0, noise, count) - depth * inside
@@ -249,9 +249,9 @@ def test_no_name_gets_out_of_the_object(hostile):
     assert page.count("<script") == page.count("</script>") == 2
     assert "<img" not in page
     assert "onerror=alert" in page  # it is there, as text
-    facts = blob_of(page)
-    assert facts["fields"][3] == facts["result"]["warnings"][0] == facts["rejected"][0]["reason"] == HOSTILE
-    assert facts["result"]["input"]["file"] == HOSTILE.replace("/", "")
+    page_data = blob_of(page)
+    assert page_data["fields"][3] == page_data["result"]["warnings"][0] == page_data["rejected"][0]["reason"] == HOSTILE
+    assert page_data["result"]["input"]["file"] == HOSTILE.replace("/", "")
 
 
 @pytest.mark.parametrize("text", ["</script>", "<!--", "]]>", "&amp;", "\u2028\u2029", "\ud800", "ü", "\\", '"'])
@@ -505,7 +505,7 @@ def test_the_residuals_that_are_drawn_are_those_of_the_cylinder(extraction):
     rng = np.random.default_rng(2)
     angles, heights = rng.uniform(-np.pi, np.pi, 4000), rng.uniform(-2, 2, 4000)
     dent = (np.abs(angles - 1.0) < 0.4) & (np.abs(heights - 1.0) < 0.4)
-    first, second = axis_frame(shape.direction)
+    first, second = axis_basis(shape.direction)
     around = np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * second
     residuals = np.where(dent, -0.1, 0.0)
     points = shape.point + heights[:, None] * shape.direction + (1.0 + residuals)[:, None] * around

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from cylx.config import AveragingConfig, Config
 from cylx.geometry.cells import Cells
 from cylx.geometry.extent import visible_extent
-from cylx.records import Candidates, Cluster, Ground, Noise, Segment
+from cylx.records import Candidates, Cluster, IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
 from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
 from cylx.synthetic import single
@@ -108,17 +108,17 @@ def test_close_candidates_are_averaged_like_vectors(spread):
 def ground_of(points, noise):
     frame, _ = make_frame(points, Config())
     known = Noise(np.ones(1), np.array([noise / frame.spacing]))
-    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), known)
-    return ground, frame
+    indexed = IndexedCloud(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), known)
+    return indexed, frame
 
 
 @pytest.fixture(scope="module")
 def scan():
     """Two thirds of a cylinder of height 6 with some outliers, and its true model in the frame."""
     scene = single(points=5000, sigma=0.01, p=0.1, sigma_o=0.1, height=6.0, theta_deg=200.0)
-    ground, frame = ground_of(scene.points, 0.01)
+    indexed, frame = ground_of(scene.points, 0.01)
     model = np.concatenate([-frame.origin, [0, 0, frame.spacing], [1.0]]) / frame.spacing
-    return ground, model
+    return indexed, model
 
 
 def assert_true(segment, truth, error):
@@ -131,7 +131,7 @@ def assert_true(segment, truth, error):
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_rough_piece_grows_into_the_whole_cylinder(scan, seed):
-    ground, truth = scan
+    indexed, truth = scan
     rng = np.random.default_rng(seed)
     start = truth.copy()
     start[2] += rng.uniform(-2, 2) * truth[6]
@@ -139,52 +139,52 @@ def test_a_rough_piece_grows_into_the_whole_cylinder(scan, seed):
     start[3:5] += 0.03 * rng.uniform(-1, 1, 2)
     start[3:6] /= np.linalg.norm(start[3:6])
     start[6] *= rng.uniform(0.97, 1.03)
-    found = refine(Segment(start, 0.5 * truth[6], 0.0), ground)
+    found = refine(Segment(start, 0.5 * truth[6], 0.0), indexed)
     # 4500 points: bound 0.0004 of the angle, 0.0005 of offset and radius
     assert_true(found, truth, 0.002)
     # an outlier beyond an end, in the last piece of a quarter of the radius that is filled, is taken for the end
     ends = (found.model[2] - truth[2] + np.array([-1, 1]) * found.half) / truth[6]
     assert np.allclose(ends, [-3, 3], atol=0.25)
-    assert np.isclose(found.spread, ground.noise.least, rtol=0.1)
+    assert np.isclose(found.spread, indexed.noise.least, rtol=0.1)
 
 
 def test_different_starts_end_in_the_same_fit(scan):
-    ground, truth = scan
+    indexed, truth = scan
     fits = []
     for shift in (-1.5, 0.0, 1.0):
         start = truth.copy()
         start[2] += shift * truth[6]
         start[:2] += 0.02 * shift * truth[6]
-        fits.append(refit(Segment(truth if shift == 0 else start, 3 * truth[6], 0.0), ground))
+        fits.append(refit(Segment(truth if shift == 0 else start, 3 * truth[6], 0.0), indexed))
     for fit in fits[1:]:
         assert np.isclose(fit.model[6], fits[0].model[6], rtol=1e-3)
 
 
 def test_a_start_beside_everything_says_so(scan):
-    ground, truth = scan
+    indexed, truth = scan
     away = truth + np.eye(7)[0] * 50 * truth[6]
     for stage in (refine, refit, measure_extent):
-        assert isinstance(stage(Segment(away, truth[6], 0.0), ground), str)
+        assert isinstance(stage(Segment(away, truth[6], 0.0), indexed), str)
 
 
 def test_segments_are_left_as_they_were(scan):
-    ground, truth = scan
+    indexed, truth = scan
     start = Segment(truth.copy(), truth[6], 0.0)
     for stage in (refine, refit, measure_extent):
-        stage(start, ground)
+        stage(start, indexed)
         assert np.array_equal(start.model, truth)
         assert start.half == truth[6]
 
 
 def test_the_extent_of_the_paper_keeps_axis_and_radius(scan):
-    ground, truth = scan
+    indexed, truth = scan
     start = truth.copy()
     start[:3] += 1.3 * truth[6] * truth[3:6]
-    found = measure_extent(Segment(start, 0.3 * truth[6], 0.0), ground)
+    found = measure_extent(Segment(start, 0.3 * truth[6], 0.0), indexed)
     assert np.array_equal(found.model[3:], truth[3:])
     assert np.allclose(np.cross(found.model[:3] - truth[:3], truth[3:6]), 0, atol=1e-9)
     assert np.isclose(found.half, 3 * truth[6], rtol=0.05)
-    assert np.isclose(found.spread, ground.noise.least, rtol=0.2)
+    assert np.isclose(found.spread, indexed.noise.least, rtol=0.2)
 
 
 def surface(rng, low, high, n, arc=2 * np.pi):

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx.config import CandidatesConfig, Config
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.geometry.ellipse import Ellipse, fit_ellipse
 from cylx.geometry.plane import Plane, random_directions
 from cylx.records import Candidates, EllipseFit
@@ -22,7 +22,7 @@ def cut(seed, oblique_deg):
     """Cut a cylinder by a plane whose normal makes an angle with its axis: the cylinder and the ellipse of the cut."""
     rng = np.random.default_rng(seed)
     shape = Cylinder(rng.standard_normal(3), rng.standard_normal(3), rng.uniform(0.3, 3))
-    normal_, across = axis_frame(shape.direction)
+    normal_, across = axis_basis(shape.direction)
     angle = np.radians(oblique_deg)
     normal = rng.choice([-1, 1]) * (np.cos(angle) * shape.direction + np.sin(angle) * normal_)
     center = shape.point + rng.uniform(-5, 5) * shape.direction
@@ -59,7 +59,7 @@ def test_one_of_the_two_axes_is_the_true_one(seed, oblique_deg):
 def test_points_of_the_cut_lead_to_the_cylinder(seed, oblique_deg):
     shape, fit = cut(seed, oblique_deg)
     # points of the surface in the plane: along each line of the mantle to where it meets the plane
-    first, second = axis_frame(shape.direction)
+    first, second = axis_basis(shape.direction)
     turns = np.linspace(0, 2 * np.pi, 30, endpoint=False)
     mantle = shape.point + shape.radius * (np.outer(np.cos(turns), first) + np.outer(np.sin(turns), second))
     reach = -fit.plane.heights(mantle) / (shape.direction @ fit.plane.normal)

@@ -6,7 +6,7 @@ import pytest
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
-from cylx.records import Finding, Ground, Noise, Segment
+from cylx.records import Finding, IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
 from cylx.stages.extending import extend
 from cylx.synthetic.surfaces import Mantle
@@ -26,7 +26,7 @@ def extended(*others, tilt=0.01, confidence=0.9):
     clean = np.concatenate([mantle(-PIECE, PIECE, 800, 1), *others])
     points = clean + SIGMA * np.random.default_rng(2).standard_normal(clean.shape)
     frame, _ = make_frame(points, Config())
-    ground = Ground(
+    indexed = IndexedCloud(
         Cells(frame.points, frame.codes),
         np.zeros(len(points)),
         Noise(np.ones(1), np.array([SIGMA / frame.spacing])),
@@ -37,13 +37,13 @@ def extended(*others, tilt=0.01, confidence=0.9):
     piece = Finding(segment, own, 10, 0.8, 0.9, 6.0, 0.01 * model[6], 0.02)
 
     def judge(longer, best):
-        width = 3.0 * ground.noise.least
-        near = ground.cells.near_cylinder(
+        width = 3.0 * indexed.noise.least
+        near = indexed.cells.near_cylinder(
             longer.model, -longer.half, longer.half, longer.model[6] - width, longer.model[6] + width
         )
         return Finding(longer, near, best.support, best.payoff, confidence, 6.0, 0.01 * longer.model[6], 0.005)
 
-    found = extend(piece, ground, judge)
+    found = extend(piece, indexed, judge)
     shape = found.segment
     middle = shape.model[:3] * frame.spacing + frame.origin
     half = shape.half * frame.spacing

@@ -8,7 +8,7 @@ import pytest
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
-from cylx.records import Finding, Ground, Noise, Segment
+from cylx.records import Finding, IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
 from cylx.stages.merging import drop_claimed, merge_pieces
 from cylx.synthetic.surfaces import Mantle
@@ -23,10 +23,10 @@ def world(*shapes, n=1500):
     points = np.concatenate(clean) + SIGMA * rng.standard_normal((n * len(shapes), 3))
     frame, _ = make_frame(points, Config())
     noise = Noise(np.ones(1), np.array([SIGMA / frame.spacing]))
-    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
+    indexed = IndexedCloud(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
     owner = np.repeat(np.arange(len(shapes)), n)[frame.order]
     findings = [finding(shape, np.flatnonzero(owner == k), frame) for k, shape in enumerate(shapes)]
-    return ground, findings, frame
+    return indexed, findings, frame
 
 
 def finding(shape, points, frame, payoff=0.8, error=0.001):
@@ -45,13 +45,13 @@ def finding(shape, points, frame, payoff=0.8, error=0.001):
     )
 
 
-def accept(ground):
+def accept(indexed):
     """Give a judge that believes everything, and takes all points near the surface."""
 
     def judge(segment, best):
         model = segment.model
-        width = 3.0 * ground.noise.least
-        near = ground.cells.near_cylinder(model, -segment.half, segment.half, model[6] - width, model[6] + width)
+        width = 3.0 * indexed.noise.least
+        near = indexed.cells.near_cylinder(model, -segment.half, segment.half, model[6] - width, model[6] + width)
         return Finding(segment, near, best.support, best.payoff, 0.9, 2 * np.pi, 0.01, 0.01)
 
     return judge
@@ -63,8 +63,8 @@ def pipe(low, high, x=0.0, radius=1.0, direction=(0, 0, 1)):
 
 @pytest.mark.parametrize("gap", [0.0, 0.5, 3.0])
 def test_two_pieces_of_a_pipe_become_one(gap):
-    ground, findings, frame = world(pipe(0, 4), pipe(4 + gap, 8 + gap))
-    (whole,) = merge_pieces(findings, ground, accept(ground))
+    indexed, findings, frame = world(pipe(0, 4), pipe(4 + gap, 8 + gap))
+    (whole,) = merge_pieces(findings, indexed, accept(indexed))
     assert np.isclose(2 * whole.segment.half * frame.spacing, 8 + gap, rtol=0.01)
     assert np.isclose(whole.segment.model[6] * frame.spacing, 1.0, rtol=0.005)
     assert np.allclose(np.cross(whole.segment.model[3:6], [0, 0, 1]), 0, atol=0.005)
@@ -72,9 +72,9 @@ def test_two_pieces_of_a_pipe_become_one(gap):
 
 
 def test_three_pieces_become_one_in_any_order():
-    ground, findings, _ = world(pipe(0, 3), pipe(3, 6), pipe(6, 9))
+    indexed, findings, _ = world(pipe(0, 3), pipe(3, 6), pipe(6, 9))
     for order in ([0, 1, 2], [0, 2, 1], [2, 0, 1]):
-        assert len(merge_pieces([findings[k] for k in order], ground, accept(ground))) == 1
+        assert len(merge_pieces([findings[k] for k in order], indexed, accept(indexed))) == 1
 
 
 @pytest.mark.parametrize(
@@ -88,38 +88,38 @@ def test_three_pieces_become_one_in_any_order():
     ids=["beside", "displaced", "thinner", "bent"],
 )
 def test_neighbours_stay_two(other):
-    ground, findings, _ = world(pipe(0, 4), other)
-    kept = merge_pieces(findings, ground, accept(ground))
+    indexed, findings, _ = world(pipe(0, 4), other)
+    kept = merge_pieces(findings, indexed, accept(indexed))
     assert sorted(map(id, kept)) == sorted(map(id, findings))
 
 
 def test_pieces_too_far_to_tell_stay_two():
-    ground, (one, other), frame = world(pipe(0, 2), pipe(30, 32))
+    indexed, (one, other), frame = world(pipe(0, 2), pipe(30, 32))
     vague = [
         finding(shape, part.points, frame, error=0.1) for shape, part in ((pipe(0, 2), one), (pipe(30, 32), other))
     ]
-    assert len(merge_pieces(vague, ground, accept(ground))) == 2
-    assert len(merge_pieces([one, other], ground, accept(ground))) == 1
+    assert len(merge_pieces(vague, indexed, accept(indexed))) == 2
+    assert len(merge_pieces([one, other], indexed, accept(indexed))) == 1
 
 
 @pytest.mark.parametrize(("x", "kept"), [(0.0, 1), (0.3, 1), (2.1, 2)], ids=["in line", "nearly", "beside"])
 def test_ends_of_a_long_pipe_are_joined_if_they_point_at_each_other(x, kept):
     shapes = pipe(0, 6), pipe(206, 212, x=x)
-    ground, parts, frame = world(*shapes)
+    indexed, parts, frame = world(*shapes)
     # one alone tells the place of the other to 0.6 radii, which would not suffice to know it from a neighbour
     vague = [finding(shape, part.points, frame, error=0.009) for shape, part in zip(shapes, parts, strict=True)]
-    assert len(merge_pieces(vague, ground, accept(ground))) == kept
+    assert len(merge_pieces(vague, indexed, accept(indexed))) == kept
 
 
 def test_the_judge_has_the_last_word():
-    ground, findings, _ = world(pipe(0, 4), pipe(4, 8))
-    assert len(merge_pieces(findings, ground, lambda segment, best: None)) == 2
+    indexed, findings, _ = world(pipe(0, 4), pipe(4, 8))
+    assert len(merge_pieces(findings, indexed, lambda segment, best: None)) == 2
 
 
 def test_nothing_and_one_are_not_merged():
-    ground, findings, _ = world(pipe(0, 4))
-    assert merge_pieces([], ground, accept(ground)) == []
-    assert merge_pieces(findings, ground, accept(ground)) == findings
+    indexed, findings, _ = world(pipe(0, 4))
+    assert merge_pieces([], indexed, accept(indexed)) == []
+    assert merge_pieces(findings, indexed, accept(indexed)) == findings
 
 
 def claims(*parts):
@@ -153,14 +153,14 @@ def far_pieces(between, tilt=0.0012):
     points = clean + SIGMA * rng.standard_normal(clean.shape)
     frame, _ = make_frame(points, Config())
     noise = Noise(np.ones(1), np.array([SIGMA / frame.spacing]))
-    ground = Ground(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
+    indexed = IndexedCloud(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
     findings = []
     for k, (low, sign) in enumerate(((0.0, 1.0), (400.0, -1.0))):
         direction = (np.sin(sign * tilt), 0, np.cos(tilt))
         own = np.flatnonzero((frame.order >= 300 * k) & (frame.order < 300 * (k + 1)))
         shape = pipe(low, low + 3.0, direction=direction)
         findings.append(replace(finding(shape, own, frame, error=0.01), tilt_error=0.004))
-    return merge_pieces(findings, ground, accept(ground))
+    return merge_pieces(findings, indexed, accept(indexed))
 
 
 def test_far_pieces_are_joined_if_there_are_points_between_them():
@@ -172,6 +172,6 @@ def test_far_pieces_are_joined_if_there_are_points_between_them():
 
 
 def test_pieces_side_by_side_are_joined_however_uncertain_their_direction():
-    ground, findings, _ = world(pipe(0.0, 2.0), pipe(2.5, 4.5))
+    indexed, findings, _ = world(pipe(0.0, 2.0), pipe(2.5, 4.5))
     findings = [replace(one, tilt_error=2.0) for one in findings]
-    assert len(merge_pieces(findings, ground, accept(ground))) == 1
+    assert len(merge_pieces(findings, indexed, accept(indexed))) == 1

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx.config import Config, SlicingConfig
-from cylx.geometry.cylinder import axis_frame
+from cylx.geometry.cylinder import axis_basis
 from cylx.geometry.plane import Plane
 from cylx.scene import make_frame
 from cylx.stages.slicing import cut_slice, draw_planes
@@ -91,7 +91,7 @@ def test_they_are_spread_evenly_over_that_part_of_the_sphere(frame, low, high):
     heights = normals @ axis
     assert heights.mean() == pytest.approx((top + bottom) / 2, abs=4 * (top - bottom) / np.sqrt(12 * n) + 1e-9)
     assert heights.std() == pytest.approx((top - bottom) / np.sqrt(12), abs=4 * (top - bottom) / np.sqrt(12 * n) + 1e-9)
-    first, second = axis_frame(axis)
+    first, second = axis_basis(axis)
     turns = np.arctan2(normals @ second, normals @ first)
     for k in (1, 2, 3):
         assert abs(np.exp(1j * k * turns).mean()) < 4 / np.sqrt(n)

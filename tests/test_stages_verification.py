@@ -8,7 +8,7 @@ from cylx.evidence.measures import PLACES, distinct_places, look_at
 from cylx.geometry.cells import Cells
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import Cylinder
-from cylx.records import Ground, Noise, Segment
+from cylx.records import IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
 from cylx.stages.verification import verify
 from cylx.synthetic.surfaces import Frustum, Mantle, Sphere
@@ -21,10 +21,10 @@ def world(points, radius=1.0, half=2.0, flat=0.0, sigma=SIGMA):
     """Give the ground of points, and the segment about the z axis of the scene."""
     frame, _ = make_frame(points, Config())
     noise = Noise(np.ones(1), np.array([sigma / frame.spacing]))
-    ground = Ground(Cells(frame.points, frame.codes), np.full(len(points), flat), noise)
+    indexed = IndexedCloud(Cells(frame.points, frame.codes), np.full(len(points), flat), noise)
     model = np.concatenate([-frame.origin, UP * frame.spacing, [radius]]) / frame.spacing
     model[3:6] = UP
-    return ground, Segment(model, half / frame.spacing, sigma / frame.spacing)
+    return indexed, Segment(model, half / frame.spacing, sigma / frame.spacing)
 
 
 def noisy(surface, n=3000, seed=0):
@@ -37,8 +37,8 @@ def pipe(arc_deg=360.0, height=4.0, n=3000):
 
 
 def judge(points, agreement=(40, 42), payoff=0.8, config=None, **place):
-    ground, segment = world(points, **place)
-    return verify(segment, ground, payoff, agreement, config or VerificationConfig())
+    indexed, segment = world(points, **place)
+    return verify(segment, indexed, payoff, agreement, config or VerificationConfig())
 
 
 def test_a_cylinder_passes_and_shows_nothing_else():
@@ -62,8 +62,8 @@ def test_a_cylinder_passes_and_shows_nothing_else():
 
 
 def test_errors_are_those_of_the_bound():
-    ground, segment = world(pipe())
-    verdict = verify(segment, ground, 0.8, (40, 42), VerificationConfig())
+    indexed, segment = world(pipe())
+    verdict = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     # over a full turn: 2 sigma / sqrt(n) of the place, 2 sigma sqrt(3) / (h / 2) / sqrt(n) of the angle
     noise, n = SIGMA * segment.model[6], len(verdict.points)
     assert np.isclose(verdict.offset_error, 2 * noise / np.sqrt(n), rtol=0.1)
@@ -72,8 +72,8 @@ def test_errors_are_those_of_the_bound():
 
 def test_nothing_and_a_few_points_are_no_cylinder():
     far = pipe() + 50.0 * np.eye(3)[0]
-    ground, segment = world(np.concatenate([far, pipe(n=15)]))
-    verdict = verify(segment, ground, 0.8, (0, 0), VerificationConfig())
+    indexed, segment = world(np.concatenate([far, pipe(n=15)]))
+    verdict = verify(segment, indexed, 0.8, (0, 0), VerificationConfig())
     assert (verdict.reason, verdict.confidence) == ("too few points", 0.0)
     assert len(verdict.points) <= 15
 
@@ -81,12 +81,12 @@ def test_nothing_and_a_few_points_are_no_cylinder():
 @pytest.mark.parametrize("taper_deg", [3.0, 8.0])
 def test_a_cone_shows_its_slope(taper_deg):
     slope = np.tan(np.radians(taper_deg))
-    ground, segment = world(noisy(Frustum(np.zeros(3), UP, 1 - slope / 2, 1 + slope / 2, 1.0)), half=0.5)
-    verdict = verify(segment, ground, 0.8, (40, 42), VerificationConfig())
+    indexed, segment = world(noisy(Frustum(np.zeros(3), UP, 1 - slope / 2, 1 + slope / 2, 1.0)), half=0.5)
+    verdict = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     assert np.isclose(verdict.measures["slope"], slope, rtol=0.4)
     assert verdict.reason != ""
     segment.model[3:6] *= -1.0  # the result has the upward direction all the same
-    turned = verify(segment, ground, 0.8, (40, 42), VerificationConfig())
+    turned = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     assert np.isclose(turned.measures["slope"], verdict.measures["slope"], rtol=1e-6)
 
 
@@ -213,8 +213,8 @@ def test_no_points_cover_nothing():
 
 
 def test_the_shell_is_what_is_about_the_segment():
-    ground, segment = world(np.concatenate([pipe(), pipe() * [3, 3, 1]]))
-    shell = look_at(segment, ground)
+    indexed, segment = world(np.concatenate([pipe(), pipe() * [3, 3, 1]]))
+    shell = look_at(segment, indexed)
     assert (np.abs(shell.heights) <= 1).all()
     assert (shell.residuals <= 0.5 * segment.model[6] * (1 + 1e-9)).all()
     assert np.array_equal(shell.on, np.abs(shell.residuals) < 3 * shell.deviation)
@@ -222,9 +222,9 @@ def test_the_shell_is_what_is_about_the_segment():
     assert not shell.flat.any()
     half = shell.thinned(2)
     assert len(half.indices) == len(half.on) == (len(shell.indices) + 1) // 2
-    ground, segment = world(pipe(), flat=1e9)
-    assert look_at(segment, ground).flat.all()
-    assert not look_at(segment, ground).on.any()
+    indexed, segment = world(pipe(), flat=1e9)
+    assert look_at(segment, indexed).flat.all()
+    assert not look_at(segment, indexed).on.any()
 
 
 @pytest.mark.parametrize("lines", [2, 3, 4, 6])

@@ -10,8 +10,8 @@ from cylx.pipeline import warmup
 
 def test_the_end_of_the_method_is_practised_whole(monkeypatch):
     found = []
-    conclude = warmup.conclude
-    monkeypatch.setattr(warmup, "conclude", lambda *args: found.append(conclude(*args)))
+    assemble = warmup.assemble
+    monkeypatch.setattr(warmup, "assemble", lambda *args: found.append(assemble(*args)))
     warmup.practise_the_end()
     # every stage from the game on had something to do
     radii = sorted(fit.cylinder.radius for fit in found[0].cylinders)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from cylx.baselines.proposal import Proposal
 from cylx.config import LineFitConfig
-from cylx.fits.robust import Kernel, fit_cylinder
+from cylx.fits.robust import WeightSchedule, fit_cylinder
 from cylx.geometry.cylinder import canonical_direction, cylinder_coordinates
 from cylx.records import EllipseFit, Frame
 
@@ -56,7 +56,9 @@ def fit_line_of_centres(fits: list[list[EllipseFit]], frame: Frame, config: Line
     _, distances, _ = cylinder_coordinates(frame.points, model[:3], model[3:6])
     near = frame.points[np.abs(distances - radius) < config.reach * radius]
     wide = WIDE * radius
-    fit = fit_cylinder(near, model, low=-math.inf, high=math.inf, kernel=Kernel(wide, wide, 1.0, math.inf), steps=50)
+    fit = fit_cylinder(
+        near, model, low=-math.inf, high=math.inf, schedule=WeightSchedule(wide, wide, 1.0, math.inf), steps=50
+    )
     if fit is None:
         return [found]
     model = fit[0]

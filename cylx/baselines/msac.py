@@ -24,7 +24,7 @@ from cylx.baselines.limits import Limits
 from cylx.baselines.normals import normals_for
 from cylx.baselines.proposal import Proposal
 from cylx.config import MsacConfig
-from cylx.fits.robust import Kernel, fit_cylinder
+from cylx.fits.robust import WeightSchedule, fit_cylinder
 from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.records import Frame
 
@@ -175,5 +175,7 @@ def _loss(points: FloatArray, model: FloatArray, distance: float, record: float)
 def _refined(inliers: FloatArray, model: FloatArray, distance: float) -> FloatArray:
     """Fit a cylinder to its inliers by least squares of the orthogonal distances."""
     wide = WIDE * distance
-    fit = fit_cylinder(inliers, model, low=-math.inf, high=math.inf, kernel=Kernel(wide, wide, 1.0, math.inf), steps=50)
+    fit = fit_cylinder(
+        inliers, model, low=-math.inf, high=math.inf, schedule=WeightSchedule(wide, wide, 1.0, math.inf), steps=50
+    )
     return model if fit is None else fit[0]

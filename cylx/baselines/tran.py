@@ -31,7 +31,7 @@ from cylx.config import TranConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.circle import fit_circle
 from cylx.geometry.coverage import covered_angle
-from cylx.geometry.cylinder import axis_frame, canonical_direction, cylinder_coordinates
+from cylx.geometry.cylinder import axis_basis, canonical_direction, cylinder_coordinates
 from cylx.records import Frame
 
 FloatArray = NDArray[np.float64]
@@ -167,7 +167,7 @@ class _Garden:
         """Give the cylinder whose axis is across all normals, and whose circle fits the points seen along it."""
         normals = self._normals[inliers]
         direction = canonical_direction(np.linalg.eigh(normals.T @ normals)[1][:, 0])
-        across = np.column_stack(axis_frame(direction))
+        across = np.column_stack(axis_basis(direction))
         circle = fit_circle((self._points[inliers] - place) @ across)
         if circle is None or not self._radii[0] <= circle[1] <= self._radii[1]:
             return None
@@ -180,7 +180,7 @@ class _Garden:
         near = self._cells.near_cylinder(model, -reach, reach, inner, outer)
         away = self._points[near] - place
         near = near[np.einsum("ij,ij->i", away, away) < reach * reach]
-        across = np.column_stack(axis_frame(model[3:6]))
+        across = np.column_stack(axis_basis(model[3:6]))
         offsets = (self._points[near] - model[:3]) @ across
         cosines = np.abs(np.einsum("ij,ij->i", offsets, self._normals[near] @ across)) / np.hypot(*offsets.T)
         agree = cosines > math.cos(math.radians(self._config.normal_angle_deg))

@@ -60,9 +60,9 @@ def doctor(*, as_json: bool) -> None:
     Libraries, compiled kernels, memory, and the extraction of a cylinder that is made up. The exit code is 0 if
     cylinders can be found and 1 if not; optional libraries that are missing are no fault. Nothing is fetched.
     """
-    from cylx.cli.terminal.display import Conversation, show_table
+    from cylx.cli.terminal.display import Messages, show_table
 
-    with Conversation().progress() as observer:
+    with Messages().progress() as observer:
         checks = diagnose(observer)
     works = all(check.state == "ok" for check in checks if check.needed)
     if as_json:

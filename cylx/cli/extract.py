@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from cylx.cli.batch.jobs import check_apart, check_outputs, plan_jobs
-from cylx.cli.batch.many import Many, made_folder
 from cylx.cli.batch.meshes import check_meshes
-from cylx.cli.options.batch import with_many
+from cylx.cli.batch.options import BatchOptions, made_folder
+from cylx.cli.options.batch import with_batch_options
 from cylx.cli.options.configuration import complete_files, configured, debug_option, overwrite_option, talking
 from cylx.cli.options.selection import selecting
 from cylx.cli.options.units import units_option
@@ -18,7 +18,7 @@ from cylx.cli.terminal.group import ExampleCommand
 
 if TYPE_CHECKING:
     from cylx.cli.batch.batch import Batch
-    from cylx.cli.terminal.display import Conversation
+    from cylx.cli.terminal.display import Messages
     from cylx.config import Config
     from cylx.records import Selection
 
@@ -82,7 +82,7 @@ if TYPE_CHECKING:
     shell_complete=complete_files,
     help="Write seconds per stage and peak memory as JSON.",
 )
-@with_many
+@with_batch_options
 @overwrite_option
 @talking
 @debug_option
@@ -102,9 +102,9 @@ def extract(
     threads: int | None,
     require: int | None,
     profile: str | None,
-    many: Many,
+    options: BatchOptions,
     overwrite: bool,
-    talk: Conversation,
+    messages: Messages,
 ) -> None:
     """Find the cylinders of one or several scans.
 
@@ -117,16 +117,16 @@ def extract(
     from cylx.cli.batch.run import Run
     from cylx.cli.batch.scans import find_scans
 
-    output = many.output(output)
-    found = find_scans(scans, recursive=many.recursive)
+    output = options.output(output)
+    found = find_scans(scans, recursive=options.recursive)
     jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png, mesh, units)
     check_meshes([job.mesh for job in jobs if job.mesh is not None], units)
-    summaries, extras = many.summaries(output, found), [] if profile is None else [profile]
+    summaries, extras = options.summaries(output, found), [] if profile is None else [profile]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])
-    run = Run(settings, threads, require, overwrite or many.resume, talk, selection)
-    batch = Batch(run, jobs, many, summaries)
+    run = Run(settings, threads, require, overwrite or options.resume, messages, selection)
+    batch = Batch(run, jobs, options, summaries)
     with made_folder(output):
-        check_outputs(jobs, [], overwrite=overwrite or many.resume)
+        check_outputs(jobs, [], overwrite=overwrite or options.resume)
         check_outputs([], extras, overwrite=overwrite)
         batch.check(overwrite=overwrite)
         if png is not None:

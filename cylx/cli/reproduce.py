@@ -18,7 +18,7 @@ from cylx.errors import OutputError, UsageError
 from cylx.version import __version__
 
 if TYPE_CHECKING:
-    from cylx.cli.terminal.display import Conversation
+    from cylx.cli.terminal.display import Messages
     from cylx.experiments import Figure, ObjectScan, Summary, Trials
 
 NUMBERS = tuple(str(number) for number in range(5, 13))
@@ -65,7 +65,7 @@ def reproduce(
     curves: str | None,
     out: str,
     data: str | None,
-    talk: Conversation,
+    messages: Messages,
     as_json: bool,
 ) -> None:
     """Run the paper's experiments again.
@@ -88,7 +88,7 @@ def reproduce(
         from cylx.experiments import ObjectScan
 
         scan = ObjectScan.of(*read_object(data))
-    study = Study(Path(out), trials, jobs or os.cpu_count() or 1, talk)
+    study = Study(Path(out), trials, jobs or os.cpu_count() or 1, messages)
     told = []
     for figure in chosen:
         summaries = study.run(figure, scan if figure.needs_scan else None)
@@ -110,7 +110,7 @@ class Study:
         Of each setting.
     jobs : int
         Processes.
-    talk : Conversation
+    messages : Messages
 
     Raises
     ------
@@ -118,11 +118,11 @@ class Study:
         If the folder cannot be made.
     """
 
-    def __init__(self, folder: Path, trials: int, jobs: int, talk: Conversation) -> None:
+    def __init__(self, folder: Path, trials: int, jobs: int, messages: Messages) -> None:
         self.folder = folder
         self.trials = trials
         self.jobs = jobs
-        self.talk = talk
+        self.messages = messages
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -149,7 +149,7 @@ class Study:
         done = self._read(table, made_by)
         draw(figure, summarize(figure, done), done)  # what is needed for the picture is there
         tasks = tasks_of(figure, self.trials, done)
-        with self.talk.progress() as observer, observed(observer, f"figure {figure.number}", len(tasks)):
+        with self.messages.progress() as observer, observed(observer, f"figure {figure.number}", len(tasks)):
             saved = monotonic()
             try:
                 for key, outcome in run_tasks(tasks, self.jobs, scan):
@@ -163,7 +163,7 @@ class Study:
         wanted = {key: outcome for key, outcome in done.items() if key.trial < self.trials}
         summaries = summarize(figure, wanted)
         write_bytes(picture, draw(figure, summaries, wanted), overwrite=True)
-        self.talk.say(f"figure {figure.number}: {len(tasks)} trials run, written to {table} and {picture}")
+        self.messages.say(f"figure {figure.number}: {len(tasks)} trials run, written to {table} and {picture}")
         return summaries
 
     def _read(self, table: Path, made_by: str) -> Trials:

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.geometry.cylinder import coordinates_of
-from cylx.records import Ground, Segment
+from cylx.records import IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
 MaskArray = NDArray[np.bool_]
@@ -66,14 +66,14 @@ class Shell:
         )
 
 
-def look_at(segment: Segment, ground: Ground) -> Shell:
+def look_at(segment: Segment, indexed: IndexedCloud) -> Shell:
     """Collect the points in and about a segment."""
     model, half = segment.model, segment.half
-    noise = ground.noise_about(model, half)
+    noise = indexed.noise_about(model, half)
     deviation = max(min(segment.spread, 2.0 * noise), noise)
-    near = ground.cells.near_cylinder(model, -half, half, 0.0, model[6] + max(0.5 * model[6], 10.0 * deviation))
-    heights, residuals, angles = coordinates_of(ground.points, near, model)
-    flat = ~ground.may_be_on(near, model[6])
+    near = indexed.cells.near_cylinder(model, -half, half, 0.0, model[6] + max(0.5 * model[6], 10.0 * deviation))
+    heights, residuals, angles = coordinates_of(indexed.points, near, model)
+    flat = ~indexed.may_be_on(near, model[6])
     on = (np.abs(residuals) < 3.0 * deviation) & ~flat
     return Shell(near, heights / max(half, 1e-300), residuals, angles, on, flat, deviation)
 

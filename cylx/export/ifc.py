@@ -8,7 +8,7 @@ from typing import Any
 
 from cylx.export.drawing import Drawing, Exported, Piece
 from cylx.export.formats import METRES
-from cylx.geometry.cylinder import axis_frame
+from cylx.geometry.cylinder import axis_basis
 from cylx.version import __version__
 
 _PREFIXES = {"m": None, "mm": "MILLI", "cm": "CENTI"}
@@ -105,7 +105,7 @@ class _Model:
     def segment(self, piece: Piece, scene: object) -> Any:  # noqa: ANN401  has no types
         """Make the pipe segment of a cylinder."""
         shape = piece.shape
-        across, _ = axis_frame(shape.direction)
+        across, _ = axis_basis(shape.direction)
         place = self.make(
             "IfcAxis2Placement3D", self.point(shape.start), self.direction(shape.direction), self.direction(across)
         )

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cylx.export.drawing import Drawing, Exported
 from cylx.export.formats import METRES
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -66,7 +66,7 @@ def mesh_of(cylinder: Cylinder) -> tuple[NDArray[np.float64], NDArray[np.int64]]
     triangles : ndarray of shape (4 SIDES, 3)
         Indices of corners, counterclockwise.
     """
-    first, second = axis_frame(cylinder.direction)
+    first, second = axis_basis(cylinder.direction)
     turn = 2.0 * np.pi * np.arange(SIDES) / SIDES
     ring = cylinder.radius * (np.outer(np.cos(turn), first) + np.outer(np.sin(turn), second))
     half = 0.5 * cylinder.height * cylinder.direction

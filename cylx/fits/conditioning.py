@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.numerics import fill_frame
+from cylx.geometry.numerics import fill_basis
 
 FloatArray = NDArray[np.float64]
 
@@ -35,11 +35,11 @@ def given_radius(
     """
     gain = covariance[:, 4] / (covariance[4, 4] + deviation**2)
     step = gain * (radius - model[6])
-    frame = np.empty((2, 3))
-    fill_frame(model[3:6], frame)
+    basis = np.empty((2, 3))
+    fill_basis(model[3:6], basis)
     moved = model.copy()
-    moved[:3] += step[:2] @ frame
-    moved[3:6] += step[2:4] @ frame
+    moved[:3] += step[:2] @ basis
+    moved[3:6] += step[2:4] @ basis
     moved[3:6] /= np.linalg.norm(moved[3:6])
     moved[6] += step[4]
     return moved, covariance - np.outer(gain, covariance[4])

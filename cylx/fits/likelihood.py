@@ -16,7 +16,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.fits.residual_law import BINS, Law, estimate_law
-from cylx.geometry.numerics import fill_frame
+from cylx.geometry.numerics import fill_basis
 
 FloatArray = NDArray[np.float64]
 
@@ -40,7 +40,7 @@ class MixtureFit(NamedTuple):
         A point of the axis, its unit direction, and the radius, freed of its bias.
     covariance : ndarray of shape (5, 5)
         Of two offsets of the axis at its point, its two tilts (radians), and the radius. The first offset and tilt are
-        along the first of the two directions of `fill_frame`, the others along the second.
+        along the first of the two directions of `fill_basis`, the others along the second.
     law : Law
     """
 
@@ -76,9 +76,9 @@ class Prior(NamedTuple):
             if away**2 > CONTRADICTION**2 * (covariance[4, 4] + self.radius_deviation**2):
                 kept = kept._replace(radius=None)
         if self.direction is not None:
-            frame = np.empty((2, 3))
-            fill_frame(fit.model[3:6], frame)
-            tilts = frame @ self.direction * np.sign(self.direction @ fit.model[3:6])
+            basis = np.empty((2, 3))
+            fill_basis(fit.model[3:6], basis)
+            tilts = basis @ self.direction * np.sign(self.direction @ fit.model[3:6])
             spread = covariance[2:4, 2:4] + self.direction_deviation**2 * np.eye(2)
             if tilts @ np.linalg.solve(spread, tilts) > CONTRADICTION**2:
                 kept = kept._replace(direction=None)
@@ -164,7 +164,7 @@ class _Sums:
     def __init__(self, reach: float) -> None:
         self.normal, self.slopes, self.scores, self.outer_scores = np.zeros((4, 5, 5))
         self.right, self.outer_right = np.zeros((2, 5))
-        self.frame = np.empty((2, 3))
+        self.basis = np.empty((2, 3))
         self.reach = reach
         self.count = self.weight = 0.0
 
@@ -184,8 +184,8 @@ class _Sums:
         self = cls(max(abs(low), abs(high)))
         matrices = np.zeros((4, 5, 5))
         vectors = np.zeros((3, 5))
-        fill_frame(model[3:6], self.frame)
-        _fill_sums(points, model, self.frame, low, high, width, self.reach, weights, full, matrices, vectors)
+        fill_basis(model[3:6], self.basis)
+        _fill_sums(points, model, self.basis, low, high, width, self.reach, weights, full, matrices, vectors)
         for matrix in matrices:
             matrix[_LOWER[1], _LOWER[0]] = matrix[_LOWER]
         self.normal, self.slopes, self.scores, self.outer_scores = matrices
@@ -201,7 +201,7 @@ class _Sums:
             values[4], precisions[4] = biased - model[6], prior.radius_deviation**-2
         if prior.direction is not None:
             direction = prior.direction * np.sign(prior.direction @ model[3:6])
-            values[2:4] = self.reach * (self.frame @ direction)
+            values[2:4] = self.reach * (self.basis @ direction)
             precisions[2:4] = (self.reach * prior.direction_deviation) ** -2
         self.right += precisions * values
         for matrix in (self.normal, self.slopes, self.scores):
@@ -234,8 +234,8 @@ def _advance(model: FloatArray, sums: _Sums) -> float:
     size = float(np.abs(step).max())
     if not size < 0.5 * model[6]:
         return math.inf
-    model[:3] += step[:2] @ sums.frame
-    model[3:6] += step[2:4] @ sums.frame / sums.reach
+    model[:3] += step[:2] @ sums.basis
+    model[3:6] += step[2:4] @ sums.basis / sums.reach
     model[3:6] /= np.linalg.norm(model[3:6])
     model[6] += step[4]
     return size if model[6] > 0.0 else math.inf
@@ -265,7 +265,7 @@ def _count_residuals(
 def _fill_sums(
     points: FloatArray,
     model: FloatArray,
-    frame: FloatArray,
+    basis: FloatArray,
     low: float,
     high: float,
     width: float,
@@ -282,8 +282,8 @@ def _fill_sums(
         z = dx * model[3] + dy * model[4] + dz * model[5]
         if z < low or z > high:
             continue
-        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        x = dx * basis[0, 0] + dy * basis[0, 1] + dz * basis[0, 2]
+        y = dx * basis[1, 0] + dy * basis[1, 1] + dz * basis[1, 2]
         distance = math.sqrt(x * x + y * y) + 1e-300
         residual = distance - model[6]
         if abs(residual) >= width:

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.numerics import FINITE, REORDERED, fill_frame, solve_in_place
+from cylx.geometry.numerics import FINITE, REORDERED, fill_basis, solve_in_place
 
 FloatArray = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ SHARP = 0.34
 background 0.378."""
 
 
-class Kernel(NamedTuple):
+class WeightSchedule(NamedTuple):
     """Width of the biweight over the steps of a fit.
 
     Each step takes `decay` times the last width or `tuning` times the spread, whichever is less.
@@ -67,15 +67,15 @@ def _accumulate(
     width: float,
     normal: FloatArray,
     right: FloatArray,
-    frame: FloatArray,
+    basis: FloatArray,
     sums: FloatArray,
 ) -> None:
     """Fill the weighted normal equations of a step; `sums` gets the weights, and the squares of residuals."""
-    fill_frame(model[3:6], frame)
+    fill_basis(model[3:6], basis)
     px, py, pz, radius = model[0], model[1], model[2], model[6]
     ux, uy, uz = model[3], model[4], model[5]
-    fx, fy, fz = frame[0, 0], frame[0, 1], frame[0, 2]
-    gx, gy, gz = frame[1, 0], frame[1, 1], frame[1, 2]
+    fx, fy, fz = basis[0, 0], basis[0, 1], basis[0, 2]
+    gx, gy, gz = basis[1, 0], basis[1, 1], basis[1, 2]
     weights, squares = 0.0, 0.0
     # with (cos, sin, z cos, z sin, 1) as the row of a point, sums of products are shared; scalars stay in registers
     c, s, cc, cs, ss = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -115,15 +115,15 @@ def _accumulate(
 
 
 @njit(cache=True, nogil=True)
-def _advance(model: FloatArray, right: FloatArray, frame: FloatArray, reach: float) -> float:
+def _advance(model: FloatArray, right: FloatArray, basis: FloatArray, reach: float) -> float:
     """Move the model by a step, at most half a radius long; give the undamped length of the step."""
     size = max(max(abs(right[0]), abs(right[1])), abs(right[4]))
     size = max(size, max(abs(right[2]), abs(right[3])) * reach)
     damping = 1.0 if size < 0.5 * model[6] else 0.5 * model[6] / size
     length = 0.0
     for d in range(3):
-        model[d] += damping * (right[0] * frame[0, d] + right[1] * frame[1, d])
-        model[3 + d] += damping * (right[2] * frame[0, d] + right[3] * frame[1, d])
+        model[d] += damping * (right[0] * basis[0, d] + right[1] * basis[1, d])
+        model[3 + d] += damping * (right[2] * basis[0, d] + right[3] * basis[1, d])
         length += model[3 + d] ** 2
     length = math.sqrt(length)
     for d in range(3):
@@ -142,11 +142,11 @@ def fit_in_place(
     schedule: FloatArray,
     normal: FloatArray,
     right: FloatArray,
-    frame: FloatArray,
+    basis: FloatArray,
 ) -> float:
     """Fit `model` = (point, direction, radius), shape (7,), to xyz[:, :n] whose height lies in [low, high].
 
-    Heights are measured from the model's point along its direction. `schedule` (6,) has what a `Kernel` has, and the
+    Heights are measured from the model's point along its direction. `schedule` (6,) has what a `WeightSchedule` has, and the
     most steps. `normal` (5, 5), `right` (5,) and `frame` (2, 3) are scratch.
 
     Returns
@@ -158,13 +158,13 @@ def fit_in_place(
     spread = width / 3.0
     sums = np.empty(2)
     for _ in range(int(schedule[5])):
-        _accumulate(xyz, n, model, low, high, width, normal, right, frame, sums)
+        _accumulate(xyz, n, model, low, high, width, normal, right, basis, sums)
         # of heights spread evenly the greatest is sqrt(3) times the root mean square
         reach = math.sqrt(3.0 * max(normal[2, 2] + normal[3, 3], 0.0) / max(sums[0], 1.0))
         if sums[0] < 8.0 or not solve_in_place(normal, right):
             return -1.0
         spread = math.sqrt(sums[1] / sums[0])
-        size = _advance(model, right, frame, reach)
+        size = _advance(model, right, basis, reach)
         if not (0.0 < model[6] < 1e12):
             return -1.0
         last = width
@@ -175,7 +175,7 @@ def fit_in_place(
 
 
 def fit_cylinder(
-    points: FloatArray, model: FloatArray, *, low: float, high: float, kernel: Kernel, steps: int
+    points: FloatArray, model: FloatArray, *, low: float, high: float, schedule: WeightSchedule, steps: int
 ) -> tuple[FloatArray, float] | None:
     """Fit a cylinder robustly, starting from a rough one.
 
@@ -186,7 +186,7 @@ def fit_cylinder(
         Start: a point of the axis, its unit direction, the radius. Not changed.
     low, high : float
         Only points whose height from the model's point lies between these take part.
-    kernel : Kernel
+    schedule : WeightSchedule
         Schedule of the weight function's width.
     steps : int
         Most Gauss-Newton steps.
@@ -202,8 +202,8 @@ def fit_cylinder(
     """
     fitted = np.array(model, dtype=np.float64)
     scratch = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
-    schedule = np.array([*kernel, steps], dtype=np.float64)
-    spread = fit_in_place(np.ascontiguousarray(points.T), len(points), fitted, low, high, schedule, *scratch)
+    numbers = np.array([*schedule, steps], dtype=np.float64)
+    spread = fit_in_place(np.ascontiguousarray(points.T), len(points), fitted, low, high, numbers, *scratch)
     return None if spread < 0 else (fitted, float(spread))
 
 
@@ -214,17 +214,17 @@ def unbiased_radius(radius: float, spread: float) -> float:
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=FINITE)
 def candidate_quality(
-    xyz: FloatArray, n: int, model: FloatArray, width: float, frame: FloatArray, quality: FloatArray
+    xyz: FloatArray, n: int, model: FloatArray, width: float, basis: FloatArray, quality: FloatArray
 ) -> None:
     """Fill the first two of `quality` with what supports a cylinder among xyz[:, :n].
 
     The inliers (within `width` of the surface), and the extent of their heights.
     """
-    fill_frame(model[3:6], frame)
+    fill_basis(model[3:6], basis)
     px, py, pz, radius = model[0], model[1], model[2], model[6]
     ux, uy, uz = model[3], model[4], model[5]
-    fx, fy, fz = frame[0, 0], frame[0, 1], frame[0, 2]
-    gx, gy, gz = frame[1, 0], frame[1, 1], frame[1, 2]
+    fx, fy, fz = basis[0, 0], basis[0, 1], basis[0, 2]
+    gx, gy, gz = basis[1, 0], basis[1, 1], basis[1, 2]
     lowest, highest, count = 1e300, -1e300, 0.0
     for i in range(n):
         dx, dy, dz = xyz[0, i] - px, xyz[1, i] - py, xyz[2, i] - pz
@@ -271,7 +271,7 @@ def polish(
     int
         2 if it does, 1 if it is badly supported, 0 if it does not fit.
     """
-    matrix, right, frame = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
+    matrix, right, basis = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
     schedule = np.empty(6)
     floor = max(3.0 * noise, 0.01 * model[6])
     schedule[0], schedule[1], schedule[2] = max(0.3 * model[6], 4.0 * noise), floor, 0.6
@@ -283,14 +283,14 @@ def polish(
         for i in range(count):
             for d in range(3):
                 some[d, i] = xyz[d, i * stride]
-        spread = fit_in_place(some, count, model, -math.inf, math.inf, schedule, matrix, right, frame)
+        spread = fit_in_place(some, count, model, -math.inf, math.inf, schedule, matrix, right, basis)
         if not 0.0 <= spread <= 1.2 * SHARP * floor:
             return 0
         schedule[0], schedule[5] = floor, LAST_STEPS  # some of the points brought it near, all decide
-    spread = fit_in_place(xyz, n, model, -math.inf, math.inf, schedule, matrix, right, frame)
+    spread = fit_in_place(xyz, n, model, -math.inf, math.inf, schedule, matrix, right, basis)
     if spread < 0.0 or spread > SHARP * floor or not (least <= model[6] <= greatest):
         return 0
-    candidate_quality(xyz, n, model, 3.0 * noise, frame, quality)
+    candidate_quality(xyz, n, model, 3.0 * noise, basis, quality)
     quality[2] = spread
     supported = quality[0] >= min_inliers and quality[0] >= min_share * n and quality[1] >= min_extent
     return 2 if supported else 1

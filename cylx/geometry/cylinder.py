@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from cylx.geometry.numerics import cross, fill_frame
+from cylx.geometry.numerics import cross, fill_basis
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -118,14 +118,14 @@ def cylinder_coordinates(
         About the axis, in (-pi, pi], from an arbitrary but fixed zero.
     """
     direction = np.asarray(direction, dtype=np.float64)
-    across, along = axis_frame(direction)
+    across, along = axis_basis(direction)
     offsets = points - np.asarray(point)
     x, y = offsets @ across, offsets @ along
     return offsets @ direction, np.hypot(x, y), np.arctan2(y, x)
 
 
-def axis_frame(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Give two unit vectors that make a right-handed frame with a unit direction.
+def axis_basis(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Give two unit vectors that make a right-handed basis with a unit direction.
 
     Returns
     -------
@@ -189,13 +189,13 @@ def fill_coordinates(
     points: FloatArray, model: FloatArray, width: float, heights: FloatArray, residuals: FloatArray, angles: FloatArray
 ) -> int:
     """Fill in height, signed distance to the surface, and angle of the points within `width` of it; count them."""
-    frame = np.empty((2, 3))
-    fill_frame(model[3:6], frame)
+    basis = np.empty((2, 3))
+    fill_basis(model[3:6], basis)
     n = 0
     for i in range(len(points)):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
-        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        x = dx * basis[0, 0] + dy * basis[0, 1] + dz * basis[0, 2]
+        y = dx * basis[1, 0] + dy * basis[1, 1] + dz * basis[1, 2]
         residual = math.sqrt(x * x + y * y) - model[6]
         if abs(residual) < width:
             heights[n] = dx * model[3] + dy * model[4] + dz * model[5]

@@ -107,8 +107,8 @@ def symmetric_eigen(matrix: FloatArray, vectors: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True)
-def fill_frame(direction: FloatArray, frame: FloatArray) -> None:
-    """Fill the rows of `frame` (2, 3) with unit vectors that make a right-handed frame with a unit direction (3,)."""
+def fill_basis(direction: FloatArray, basis: FloatArray) -> None:
+    """Fill the rows of `frame` (2, 3) with unit vectors that make a right-handed basis with a unit direction (3,)."""
     x, y, z = direction[0], direction[1], direction[2]
     if abs(x) <= abs(y) and abs(x) <= abs(z):
         a, b, c = 0.0, z, -y
@@ -118,8 +118,8 @@ def fill_frame(direction: FloatArray, frame: FloatArray) -> None:
         a, b, c = y, -x, 0.0
     length = math.sqrt(a * a + b * b + c * c)
     a, b, c = a / length, b / length, c / length
-    frame[0, 0], frame[0, 1], frame[0, 2] = a, b, c
-    frame[1, 0], frame[1, 1], frame[1, 2] = y * c - z * b, z * a - x * c, x * b - y * a
+    basis[0, 0], basis[0, 1], basis[0, 2] = a, b, c
+    basis[1, 0], basis[1, 1], basis[1, 2] = y * c - z * b, z * a - x * c, x * b - y * a
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.cylinder import axis_frame
+from cylx.geometry.cylinder import axis_basis
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Plane:
-    """A plane with a right-handed frame (first, second, normal).
+    """A plane with a right-handed basis (first, second, normal).
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Plane:
 
     def project(self, points: FloatArray) -> FloatArray:
         """Give coordinates of points (N, 3) in the plane, along the normal, shape (N, 2)."""
-        first, second = axis_frame(self.normal)
+        first, second = axis_basis(self.normal)
         return (points - self.point) @ np.column_stack([first, second])
 
     def lift(self, coordinates: FloatArray) -> FloatArray:
@@ -42,7 +42,7 @@ class Plane:
 
     def lift_vectors(self, vectors: FloatArray) -> FloatArray:
         """Give the vectors in space of vectors (..., 2) in the plane, shape (..., 3)."""
-        return np.asarray(vectors @ np.stack(axis_frame(self.normal)))
+        return np.asarray(vectors @ np.stack(axis_basis(self.normal)))
 
 
 def random_directions(count: int, rng: np.random.Generator) -> FloatArray:

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.numerics import REORDERED, fill_frame, solve_in_place, symmetric_eigen
+from cylx.geometry.numerics import REORDERED, fill_basis, solve_in_place, symmetric_eigen
 
 FloatArray = NDArray[np.float64]
 
@@ -111,7 +111,7 @@ def osculating_cylinder(
     model: FloatArray,
     gram: FloatArray,
     terms: FloatArray,
-    frame: FloatArray,
+    basis: FloatArray,
     local: FloatArray,
 ) -> bool:
     """Fit a quadric over a plane to xyz[:, :n] and fill `model` (7,) with the cylinder that osculates it.
@@ -120,7 +120,7 @@ def osculating_cylinder(
     ----------
     center, normal : ndarray of shape (3,)
         The plane, from `fit_plane`.
-    gram, terms, frame, local : ndarray of shape (6, 6), (6,), (2, 3), (4, >= n)
+    gram, terms, basis, local : ndarray of shape (6, 6), (6,), (2, 3), (4, >= n)
         Scratch.
 
     Returns
@@ -128,11 +128,11 @@ def osculating_cylinder(
     bool
         False if there are too few points or the surface is not curved.
     """
-    fill_frame(normal, frame)
+    fill_basis(normal, basis)
     for i in range(n):
         dx, dy, dz = xyz[0, i] - center[0], xyz[1, i] - center[1], xyz[2, i] - center[2]
-        local[0, i] = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        local[1, i] = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        local[0, i] = dx * basis[0, 0] + dy * basis[0, 1] + dz * basis[0, 2]
+        local[1, i] = dx * basis[1, 0] + dy * basis[1, 1] + dz * basis[1, 2]
         local[2, i] = dx * normal[0] + dy * normal[1] + dz * normal[2]
         local[3, i] = 0.0
     width = math.inf
@@ -142,7 +142,7 @@ def osculating_cylinder(
             return False
         # two standard deviations, from the mean deviation
         width = max(2.5 * noise, 2.5 * _fill_residuals(local, n, width, terms) / count)
-    return _fill_model(terms, center, normal, frame, model)
+    return _fill_model(terms, center, normal, basis, model)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
@@ -190,7 +190,7 @@ def _fill_residuals(local: FloatArray, n: int, width: float, terms: FloatArray) 
 
 @njit(cache=True, nogil=True)
 def _fill_model(
-    terms: FloatArray, center: FloatArray, normal: FloatArray, frame: FloatArray, model: FloatArray
+    terms: FloatArray, center: FloatArray, normal: FloatArray, basis: FloatArray, model: FloatArray
 ) -> bool:
     """Turn the terms of a quadric into the osculating cylinder at the foot of the plane's centre."""
     gx, gy = terms[3], terms[4]
@@ -214,12 +214,12 @@ def _fill_model(
         ax, ay = 1.0, 0.0
     length, along = 0.0, 0.0
     for d in range(3):
-        model[3 + d] = frame[0, d] * ax + frame[1, d] * ay + normal[d] * (gx * ax + gy * ay)
+        model[3 + d] = basis[0, d] * ax + basis[1, d] * ay + normal[d] * (gx * ax + gy * ay)
         length += model[3 + d] ** 2
     length = math.sqrt(length)
     for d in range(3):
         model[3 + d] /= length
-        model[d] = (normal[d] - gx * frame[0, d] - gy * frame[1, d]) / slant
+        model[d] = (normal[d] - gx * basis[0, d] - gy * basis[1, d]) / slant
         along += model[d] * model[3 + d]
     inward = 0.0
     for d in range(3):

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
-from cylx.pipeline.assembly import conclude
+from cylx.pipeline.assembly import assemble
 from cylx.pipeline.candidates import (
     candidates_along_axis,
     candidates_of_slices,
@@ -15,10 +15,10 @@ from cylx.pipeline.candidates import (
     ellipses_of_slices,
     windows_and_explained,
 )
-from cylx.pipeline.rounds import Turns
-from cylx.pipeline.stage_log import Journal
+from cylx.pipeline.rounds import Rounds
+from cylx.pipeline.stage_log import StageLog
 from cylx.pipeline.warmup import kernels_are_cold, practice_cloud, second_process
-from cylx.records import Candidates, Extraction, Ground, Observer, PointCloud, SilentObserver
+from cylx.records import Candidates, Extraction, IndexedCloud, Observer, PointCloud, SilentObserver
 from cylx.scene import catalogue_of, check_usable, known_of, make_frame, radius_range, resolve
 from cylx.stages.clustering import CandidateGame, thin_candidates
 
@@ -53,38 +53,38 @@ def extract_cylinders(
     """
     check_usable(cloud.points, cloud.source.file)
     threads = threads or os.cpu_count() or 1
-    journal = Journal(observer or SilentObserver())
+    log = StageLog(observer or SilentObserver())
     if kernels_are_cold():
-        with journal.stage("compiling"), second_process():
+        with log.stage("compiling"), second_process():
             extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
     if config.method != "gt":
         from cylx.pipeline.competitors import extract_by_competitor  # noqa: PLC0415  brings scipy.spatial: 0.3 s
 
-        return extract_by_competitor(cloud, config, threads, journal)
-    with journal.stage("scene"):
+        return extract_by_competitor(cloud, config, threads, log)
+    with log.stage("scene"):
         frame, scene = make_frame(cloud.points, config, threads)
         scene = replace(scene, given=config.scene.given)
         config = resolve(config, scene)
         radii = radius_range(config, frame)
-    with journal.stage("curvature"):
-        windows, explained = windows_and_explained(frame, radii, config, threads, journal)
-        ground = Ground(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
-    with journal.stage("slicing"):
-        fits = ellipses_of_slices(frame, explained.flatness, radii, config, threads, journal)
-    with journal.stage("candidates"):
-        whole = candidates_of_slices(fits, frame, radii, config, journal)
-        local = candidates_of_windows(frame, explained, radii, config, threads, journal)
+    with log.stage("curvature"):
+        windows, explained = windows_and_explained(frame, radii, config, threads, log)
+        indexed = IndexedCloud(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
+    with log.stage("slicing"):
+        fits = ellipses_of_slices(frame, explained.flatness, radii, config, threads, log)
+    with log.stage("candidates"):
+        whole = candidates_of_slices(fits, frame, radii, config, log)
+        local = candidates_of_windows(frame, explained, radii, config, threads, log)
         candidates = Candidates.joined([windows, whole, local])
-    with journal.stage("clustering"):
-        players = candidates_along_axis(candidates, config, journal)
-        players = thin_candidates(players) if config.clustering.population == "local" else players
-        witnesses = Candidates.joined([windows, local]) if len(windows) else candidates
-        game = CandidateGame(players, config.clustering, threads)
+    with log.stage("clustering"):
+        candidates = candidates_along_axis(candidates, config, log)
+        candidates = thin_candidates(candidates) if config.clustering.population == "local" else candidates
+        all_windows = Candidates.joined([windows, local]) if len(windows) else candidates
+        game = CandidateGame(candidates, config.clustering, threads)
         known, catalogue = known_of(config, frame), catalogue_of(config, frame)
-        turns = Turns(game, players, witnesses, ground, radii, known, catalogue, config, threads)
-    with journal.stage("averaging"):
-        findings = turns.play(journal)
-    with journal.stage("merging"):
-        findings = turns.merge(findings, journal)
-    with journal.stage("labelling"):
-        return conclude(cloud, frame, scene, ground, findings, turns.refused, journal.reports, config)
+        rounds = Rounds(game, candidates, all_windows, indexed, radii, known, catalogue, config, threads)
+    with log.stage("averaging"):
+        findings = rounds.play(log)
+    with log.stage("merging"):
+        findings = rounds.merge(findings, log)
+    with log.stage("labelling"):
+        return assemble(cloud, frame, scene, indexed, findings, rounds.refused, log.reports, config)

@@ -13,11 +13,11 @@ from cylx.records import (
     Extraction,
     Finding,
     Frame,
-    Ground,
+    IndexedCloud,
     NominalRadius,
     PointCloud,
-    Refusal,
-    Rejection,
+    RejectedCylinder,
+    RejectedSegment,
     Scene,
     StageReport,
 )
@@ -26,13 +26,13 @@ from cylx.stages.averaging import inflation
 from cylx.stages.labelling import label_points, surface_points
 
 
-def conclude(
+def assemble(
     cloud: PointCloud,
     frame: Frame,
     scene: Scene,
-    ground: Ground,
+    indexed: IndexedCloud,
     findings: list[Finding],
-    refused: list[Refusal],
+    refused: list[RejectedSegment],
     reports: list[StageReport],
     config: Config,
 ) -> Extraction:
@@ -43,9 +43,9 @@ def conclude(
     cloud : PointCloud
     frame : Frame
     scene : Scene
-    ground : Ground
+    indexed : IndexedCloud
     findings : list of Finding
-    refused : list of Refusal
+    refused : list of RejectedSegment
         What was not accepted, in the order it came.
     reports : list of StageReport
     config : Config
@@ -55,7 +55,7 @@ def conclude(
     -------
     Extraction
     """
-    labels, residuals = label_points([finding.segment for finding in findings], ground)
+    labels, residuals = label_points([finding.segment for finding in findings], indexed)
     counts = np.bincount(labels[labels >= 0], minlength=len(findings))
     game = config.method == "gt"
     verified = config.verification.enabled and game
@@ -83,8 +83,8 @@ def conclude(
     in_cloud[0][frame.order] = number[labels]
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
     warnings = (*_warnings(cloud, scene, fits), *_contradicted(config, fits), *_unlisted(config, fits))
-    lost = [Refusal.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
-    rejected = tuple(_rejections([*refused, *lost], frame, ground, verified=verified, game=game))
+    lost = [RejectedSegment.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
+    rejected = tuple(_rejections([*refused, *lost], frame, indexed, verified=verified, game=game))
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
 
 
@@ -108,25 +108,27 @@ def _nominal(finding: Finding, config: Config, spacing: float) -> NominalRadius 
     )
 
 
-def _rejections(refused: list[Refusal], frame: Frame, ground: Ground, *, verified: bool, game: bool) -> list[Rejection]:
+def _rejections(
+    refused: list[RejectedSegment], frame: Frame, indexed: IndexedCloud, *, verified: bool, game: bool
+) -> list[RejectedCylinder]:
     """Put what was refused into scene units, the most trusted first; what has no shape at all is left out."""
     out = []
-    for refusal in refused:
-        segment = refusal.segment
+    for rejected_segment in refused:
+        segment = rejected_segment.segment
         if not (np.isfinite(segment.model).all() and segment.model[6] > 0.0 and segment.half >= 0.0):
             continue
-        _, residuals, angles = surface_points(segment, ground)
+        _, residuals, angles = surface_points(segment, indexed)
         fit = CylinderFit(
             frame.to_scene(segment.cylinder),
             len(residuals),
             float(np.sqrt((residuals**2).sum() / max(len(residuals), 1))) * frame.spacing,
-            refusal.coverage if refusal.measures else covered_angle(angles),
-            refusal.support,
-            refusal.payoff if game else None,
-            refusal.confidence if verified else None,
-            refusal.measures,
+            rejected_segment.coverage if rejected_segment.measures else covered_angle(angles),
+            rejected_segment.support,
+            rejected_segment.payoff if game else None,
+            rejected_segment.confidence if verified else None,
+            rejected_segment.measures,
         )
-        out.append(Rejection(fit, refusal.reason))
+        out.append(RejectedCylinder(fit, rejected_segment.reason))
     return sorted(out, key=lambda one: (one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers))
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.geometry.lines import are_along
-from cylx.pipeline.stage_log import Journal
+from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, EllipseFit, Explained, Frame
 from cylx.stages.candidates import polish_candidates, propose_cylinders
 from cylx.stages.curvature import find_curved_windows
@@ -28,12 +28,12 @@ MARGIN = 5.0
 
 
 def windows_and_explained(
-    frame: Frame, radii: tuple[float, float], config: Config, threads: int, journal: Journal
+    frame: Frame, radii: tuple[float, float], config: Config, threads: int, log: StageLog
 ) -> tuple[Candidates, Explained]:
     """Propose candidates from curved windows, and tell which points lie in flat ones."""
     if "curvature" in config.candidates.sources:
         windows, explained, report = find_curved_windows(frame, radii, config.candidates, threads)
-        journal.reports.append(report)
+        log.reports.append(report)
         return windows, explained
     explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
     if config.slicing.local_planes:  # slices, too, pass over what is flat
@@ -42,7 +42,7 @@ def windows_and_explained(
 
 
 def ellipses_of_slices(
-    frame: Frame, flatness: FloatArray, radii: tuple[float, float], config: Config, threads: int, journal: Journal
+    frame: Frame, flatness: FloatArray, radii: tuple[float, float], config: Config, threads: int, log: StageLog
 ) -> list[list[EllipseFit]]:
     """Cut the cloud by random planes and fit all ellipses; each slice has a generator of its own."""
     if "slices" not in config.candidates.sources:
@@ -73,14 +73,14 @@ def ellipses_of_slices(
         results = list(pool.map(work, range(len(planes))))
     fits = [result or [] for result in results]
     few = sum(1 for result in results if result is None)
-    journal.report("slicing", len(planes), len(planes) - few, {"too few points": few})
+    log.report("slicing", len(planes), len(planes) - few, {"too few points": few})
     empty = sum(1 for result in results if result == [])
-    journal.report("ellipses", len(planes) - few, sum(map(len, fits)), {"no ellipse in the slice": empty})
+    log.report("ellipses", len(planes) - few, sum(map(len, fits)), {"no ellipse in the slice": empty})
     return fits
 
 
 def candidates_of_slices(
-    fits: list[list[EllipseFit]], frame: Frame, radii: tuple[float, float], config: Config, journal: Journal
+    fits: list[list[EllipseFit]], frame: Frame, radii: tuple[float, float], config: Config, log: StageLog
 ) -> Candidates:
     """Make two candidates of each ellipse, and polish them if asked for."""
     proposed = propose_cylinders(fits)
@@ -89,12 +89,12 @@ def candidates_of_slices(
     kept = proposed
     if config.candidates.polish and len(proposed):
         kept = polish_candidates(proposed, frame, radii, config.candidates)
-    journal.report("candidates", len(proposed), len(kept), {"does not fit": len(proposed) - len(kept)})
+    log.report("candidates", len(proposed), len(kept), {"does not fit": len(proposed) - len(kept)})
     return kept
 
 
 def candidates_of_windows(
-    frame: Frame, explained: Explained, radii: tuple[float, float], config: Config, threads: int, journal: Journal
+    frame: Frame, explained: Explained, radii: tuple[float, float], config: Config, threads: int, log: StageLog
 ) -> Candidates:
     """Cut windows of all scales by planes, where nothing else explains the points."""
     if "slices" not in config.candidates.sources or not config.slicing.local_planes:
@@ -104,16 +104,16 @@ def candidates_of_windows(
         frame, explained, radii, config.slicing, config.candidates.octave, supported, config.seed, threads
     )
     cut = counts.pop("slices")
-    journal.report("local slicing", cut, len(found), counts)
+    log.report("local slicing", cut, len(found), counts)
     return found
 
 
-def candidates_along_axis(candidates: Candidates, config: Config, journal: Journal) -> Candidates:
+def candidates_along_axis(candidates: Candidates, config: Config, log: StageLog) -> Candidates:
     """Keep the candidates about the axis that is asked for, if one is."""
     axis = config.scene.axis
     if axis is None:
         return candidates
     tolerance = np.radians(config.scene.axis_tolerance_deg + MARGIN)
     kept = candidates.take(are_along(candidates.directions, axis, tolerance))
-    journal.report("priors", len(candidates), len(kept), {"axis out of range": len(candidates) - len(kept)})
+    log.report("priors", len(candidates), len(kept), {"axis out of range": len(candidates) - len(kept)})
     return kept

@@ -15,8 +15,8 @@ from cylx.config import Config
 from cylx.fits.likelihood import Prior
 from cylx.fits.nominal_radius import Catalogue
 from cylx.game.agreement import Neighbourhood, is_contradicted
-from cylx.pipeline.stage_log import Journal
-from cylx.records import Candidates, Cluster, Finding, Ground, Refusal, Segment
+from cylx.pipeline.stage_log import StageLog
+from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import out_of_range
 from cylx.stages.averaging import average_cluster, finish, inflation, measure_extent, refine, refit
 from cylx.stages.clustering import CandidateGame
@@ -34,17 +34,17 @@ ROUND = 16
 """Clusters fitted at the same time; the number does not depend on that of the threads, and so the result does not."""
 
 
-class Turns:
+class Rounds:
     """The loop over clusters.
 
     Parameters
     ----------
     game : CandidateGame
-    players : Candidates
+    candidates : Candidates
         Those in the game.
-    witnesses : Candidates
+    all_windows : Candidates
         What a cylinder should agree with: all curved windows, which are drawn evenly over the surface.
-    ground : Ground
+    indexed : IndexedCloud
         The cloud.
     radii : tuple of float
         Least and greatest radius, frame units; they hold for the fitted cylinders, too.
@@ -59,16 +59,16 @@ class Turns:
 
     Attributes
     ----------
-    refused : list of Refusal
+    refused : list of RejectedSegment
         What was not accepted so far, but for what had been found before.
     """
 
     def __init__(
         self,
         game: CandidateGame,
-        players: Candidates,
-        witnesses: Candidates,
-        ground: Ground,
+        candidates: Candidates,
+        all_windows: Candidates,
+        indexed: IndexedCloud,
         radii: tuple[float, float],
         known: Prior | None,
         catalogue: Catalogue | None,
@@ -76,19 +76,19 @@ class Turns:
         threads: int,
     ) -> None:
         self._game = game
-        self._players = players
-        self._witnesses = Neighbourhood(witnesses)
-        self._ground = ground
+        self._candidates = candidates
+        self._all_windows = Neighbourhood(all_windows)
+        self._indexed = indexed
         self._radii = radii
         self._known = known
         self._catalogue = catalogue
         self._config = config
         self._threads = threads
-        self.refused: list[Refusal] = []
+        self.refused: list[RejectedSegment] = []
         # the paper takes no more than the winners out of the game (section 3.5)
         self._removes = config.clustering.population == "local"
 
-    def play(self, journal: Journal) -> list[Finding]:
+    def play(self, log: StageLog) -> list[Finding]:
         """Take cluster after cluster until none is left, or until as many cylinders as asked for are found."""
         findings: list[Finding] = []
         rejected: Counter[str] = Counter()
@@ -106,11 +106,11 @@ class Turns:
                         # what the like of a refused segment would lead to is known, too
                         closely = not isinstance(found, Finding)
                         self._game.withdraw(self._game.explained_by(found.segment, closely=closely))
-                    journal.advance()
+                    log.advance()
                 if self._enough(findings):
                     break
-        journal.reports.append(self._game.report())
-        journal.report("verification", len(findings) + rejected.total(), len(findings), rejected)
+        log.reports.append(self._game.report())
+        log.report("verification", len(findings) + rejected.total(), len(findings), rejected)
         return findings
 
     def _next_clusters(self) -> list[tuple[Cluster, Segment]]:
@@ -120,69 +120,73 @@ class Turns:
             cluster = self._game.next_cluster()
             if cluster is None:
                 break
-            average = average_cluster(self._players, cluster, self._config.averaging)
+            average = average_cluster(self._candidates, cluster, self._config.averaging)
             clusters.append((cluster, average))
             if self._removes:
                 self._game.withdraw(self._game.explained_by(average, closely=True))
         return clusters
 
-    def _try(self, candidate: tuple[Cluster, Segment], known: FloatArray) -> Finding | Refusal:
+    def _try(self, candidate: tuple[Cluster, Segment], known: FloatArray) -> Finding | RejectedSegment:
         """Fit an average and judge it: the finding, or why it is none."""
         cluster, average = candidate
         support, payoff = len(cluster.members), cluster.payoff
-        if self._config.verification.enabled and is_contradicted(self._witnesses.agreement(average)):
-            return Refusal(average, "agreement", support, payoff)
+        if self._config.verification.enabled and is_contradicted(self._all_windows.agreement(average)):
+            return RejectedSegment(average, "agreement", support, payoff)
         fitted = self._fit(average)
         if isinstance(fitted, str):
-            return Refusal(average, fitted, support, payoff)
+            return RejectedSegment(average, fitted, support, payoff)
         if self._removes and is_part_of(fitted, known):
-            return Refusal(fitted, FOUND_BEFORE, support, payoff)
+            return RejectedSegment(fitted, FOUND_BEFORE, support, payoff)
         return self._judge(fitted, support, payoff)
 
-    def _new_or_known(self, found: Finding | Refusal, findings: list[Finding]) -> Finding | Refusal:
+    def _new_or_known(self, found: Finding | RejectedSegment, findings: list[Finding]) -> Finding | RejectedSegment:
         """Refuse a finding that another cluster of the same round has led to before."""
         if not (self._removes and isinstance(found, Finding)):
             return found
         known = as_rows([finding.segment for finding in findings[-ROUND:]])
-        return Refusal.of(found, FOUND_BEFORE) if is_part_of(found.segment, known) else found
+        return RejectedSegment.of(found, FOUND_BEFORE) if is_part_of(found.segment, known) else found
 
-    def merge(self, findings: list[Finding], journal: Journal) -> list[Finding]:
+    def merge(self, findings: list[Finding], log: StageLog) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
         kept = findings
         joined = claimed = 0
-        strayed: list[Refusal] = []
+        strayed: list[RejectedSegment] = []
         if self._config.averaging.merge:
-            distinct = drop_claimed(findings, len(self._ground.points))
-            pieces = merge_pieces(distinct, self._ground, self._join)
+            distinct = drop_claimed(findings, len(self._indexed.points))
+            pieces = merge_pieces(distinct, self._indexed, self._join)
             with ThreadPoolExecutor(self._threads) as pool:
-                longer = list(pool.map(lambda piece: extend(piece, self._ground, self._join), pieces))
+                longer = list(pool.map(lambda piece: extend(piece, self._indexed, self._join), pieces))
             if any(one is not other for one, other in zip(longer, pieces, strict=True)):
-                pieces = merge_pieces(longer, self._ground, self._join)
-            kept = drop_claimed(pieces, len(self._ground.points))
+                pieces = merge_pieces(longer, self._indexed, self._join)
+            kept = drop_claimed(pieces, len(self._indexed.points))
             for before, after in ((findings, distinct), (pieces, kept)):
                 there = {id(finding) for finding in after}
-                self.refused += [Refusal.of(one, "claimed by a better one") for one in before if id(one) not in there]
+                self.refused += [
+                    RejectedSegment.of(one, "claimed by a better one") for one in before if id(one) not in there
+                ]
             joined = len(distinct) - len(pieces)
             claimed = len(findings) - joined - len(kept)
         if self._config.averaging.refine:
             with ThreadPoolExecutor(self._threads) as pool:
                 finished = list(pool.map(self._finish, kept))
-            strayed = [Refusal.of(one, reason) for one in finished if (reason := self._out_of_range(one.segment))]
+            strayed = [
+                RejectedSegment.of(one, reason) for one in finished if (reason := self._out_of_range(one.segment))
+            ]
             kept = [finding for finding in finished if not self._out_of_range(finding.segment)]
             self.refused += strayed
         kept = sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))
         beyond = kept[self._config.max_cylinders :] if self._config.max_cylinders else []
         kept = kept[: len(kept) - len(beyond)]
-        self.refused += [Refusal.of(finding, "beyond max_cylinders") for finding in beyond]
+        self.refused += [RejectedSegment.of(finding, "beyond max_cylinders") for finding in beyond]
         rejected = {"joined": joined, "claimed by a better one": claimed, "beyond max_cylinders": len(beyond)}
-        rejected |= Counter(refusal.reason for refusal in strayed)
-        journal.report("merging", len(findings), len(kept), rejected)
+        rejected |= Counter(rejected_segment.reason for rejected_segment in strayed)
+        log.report("merging", len(findings), len(kept), rejected)
         return kept
 
     def _finish(self, finding: Finding) -> Finding:
         """Fit a finding to all its points; up to here a sample of them was enough."""
         inflated = inflation(finding.measures)
-        fitted = finish(finding.segment, self._ground, self._known, self._catalogue, inflated=inflated)
+        fitted = finish(finding.segment, self._indexed, self._known, self._catalogue, inflated=inflated)
         return finding if isinstance(fitted, str) else replace(finding, segment=fitted)
 
     def _enough(self, findings: list[Finding]) -> bool:
@@ -191,26 +195,26 @@ class Turns:
         return most is not None and not self._config.averaging.merge and len(findings) >= most
 
     def _fit(self, segment: Segment) -> Segment | str:
-        return (refine if self._config.averaging.refine else measure_extent)(segment, self._ground)
+        return (refine if self._config.averaging.refine else measure_extent)(segment, self._indexed)
 
     def _join(self, segment: Segment, best: Finding) -> Finding | None:
         """Refit and judge a joined segment in the light of the better of its parts."""
-        fitted = refit(segment, self._ground)
+        fitted = refit(segment, self._indexed)
         found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
         return found if isinstance(found, Finding) else None
 
-    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | Refusal:
+    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | RejectedSegment:
         """Verify a segment; what speaks most against it if it does not pass."""
         if reason := self._out_of_range(segment):
-            return Refusal(segment, reason, support, payoff)
-        counts = self._witnesses.agreement(segment)
-        verdict = verify(segment, self._ground, payoff, counts, self._config.verification)
+            return RejectedSegment(segment, reason, support, payoff)
+        counts = self._all_windows.agreement(segment)
+        verdict = verify(segment, self._indexed, payoff, counts, self._config.verification)
         reason, limits = verdict.reason, self._config.verification
         if verdict.measures and not limits.enabled:
             reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""
         if reason:
             confidence = verdict.confidence if verdict.measures else None
-            return Refusal(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
+            return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
         return Finding(
             segment,
             verdict.points,

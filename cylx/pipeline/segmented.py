@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from cylx.errors import InputError
 from cylx.fits.likelihood import fit_mixture
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, unbiased_radius
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, unbiased_radius
 from cylx.fits.robust import fit_cylinder as fit_robustly
 from cylx.geometry.coverage import covered_angle
-from cylx.geometry.cylinder import Cylinder, axis_frame, canonical_direction, cylinder_coordinates
+from cylx.geometry.cylinder import Cylinder, axis_basis, canonical_direction, cylinder_coordinates
 from cylx.records import CylinderFit, PointCloud
 from cylx.scene import check_usable
 
@@ -129,7 +129,7 @@ def _sphere(count: int) -> FloatArray:
 
 def _about(direction: FloatArray, cone: float) -> FloatArray:
     """Give unit vectors (24, 3) about one, within an angle."""
-    first, second = axis_frame(direction)
+    first, second = axis_basis(direction)
     turns = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
     tilts = cone * np.concatenate([[0.5 * np.cos(turns), 0.5 * np.sin(turns)], [np.cos(turns), np.sin(turns)]], axis=1)
     around = direction + np.outer(tilts[0], first) + np.outer(tilts[1], second)
@@ -141,7 +141,7 @@ def _circles(points: FloatArray, directions: FloatArray) -> tuple[FloatArray, Fl
 
     An algebraic fit comes first, then steps of an orthogonal one, in which points far off weigh less.
     """
-    frames = np.array([axis_frame(direction) for direction in directions])
+    frames = np.array([axis_basis(direction) for direction in directions])
     x, y = np.einsum("dka,na->kdn", frames, points)
     rows = np.stack([2.0 * x, 2.0 * y, np.ones_like(x)], axis=2)
     shapes = _solve(rows, x**2 + y**2, np.ones_like(x))
@@ -179,8 +179,8 @@ def _best_fit(points: FloatArray, starts: list[FloatArray]) -> tuple[FloatArray,
         away = np.median(np.abs(cylinder_coordinates(points, start[:3], start[3:6])[1] - start[6]))
         width = max(8.0 * float(away), 1e-9)
         floor = width if len(points) < FEW else 1e-9
-        kernel = Kernel(width, floor, 1.0, TUKEY * TUKEY_SPREAD, 1e-6)
-        fit = fit_robustly(points, start, low=-math.inf, high=math.inf, kernel=kernel, steps=100)
+        schedule = WeightSchedule(width, floor, 1.0, TUKEY * TUKEY_SPREAD, 1e-6)
+        fit = fit_robustly(points, start, low=-math.inf, high=math.inf, schedule=schedule, steps=100)
         if fit is None:
             continue
         model, spread = fit
@@ -235,8 +235,8 @@ def _fit_steadily(points: FloatArray, model: FloatArray) -> tuple[FloatArray, fl
     """Fit with a width that stays as it is: of few points one that adapts would pick those that agree by chance."""
     away = np.median(np.abs(cylinder_coordinates(points, model[:3], model[3:6])[1] - model[6]))
     width = max(2.0 * TUKEY * 1.4826 * float(away) * math.sqrt(len(points) / (len(points) - 5.0)), 1e-9)
-    kernel = Kernel(width, width, 1.0, math.inf, 1e-6)
-    fit = fit_robustly(points, model, low=-math.inf, high=math.inf, kernel=kernel, steps=100)
+    schedule = WeightSchedule(width, width, 1.0, math.inf, 1e-6)
+    fit = fit_robustly(points, model, low=-math.inf, high=math.inf, schedule=schedule, steps=100)
     return None if fit is None else (fit[0], max(fit[1] * TUKEY_SPREAD, 1e-9 * float(fit[0][6])))
 
 

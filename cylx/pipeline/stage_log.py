@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from cylx.records import Observer, StageReport
 
 
-class Journal:
+class StageLog:
     """Times the stages for an observer and keeps their reports.
 
     Parameters

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.geometry.morton import find_cell, morton_codes
-from cylx.pipeline.assembly import conclude
+from cylx.pipeline.assembly import assemble
 from cylx.pipeline.candidates import candidates_of_windows
-from cylx.pipeline.rounds import Turns
-from cylx.pipeline.stage_log import Journal
-from cylx.records import Candidates, Explained, Frame, Ground, Noise, PointCloud, Scene, SilentObserver
+from cylx.pipeline.rounds import Rounds
+from cylx.pipeline.stage_log import StageLog
+from cylx.records import Candidates, Explained, Frame, IndexedCloud, Noise, PointCloud, Scene, SilentObserver
 from cylx.scene import resolve
 from cylx.stages.clustering import CandidateGame
 
@@ -82,15 +82,15 @@ def practise_the_end() -> None:
     config = resolve(Config(), scene)
     cloud = PointCloud(practice_cloud())
     frame = _practice_frame(cloud.points)
-    radii, journal = (0.5, 100.0), Journal(SilentObserver())
+    radii, log = (0.5, 100.0), StageLog(SilentObserver())
     explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
-    ground = Ground(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
-    players = _practice_candidates(frame)
-    game = CandidateGame(players, config.clustering, 1)
-    turns = Turns(game, players, players, ground, radii, None, None, config, 1)
-    findings = turns.merge(turns.play(journal), journal)
-    conclude(cloud, frame, scene, ground, findings, turns.refused, journal.reports, config)
-    candidates_of_windows(frame, explained, radii, config, 1, journal)
+    indexed = IndexedCloud(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
+    candidates = _practice_candidates(frame)
+    game = CandidateGame(candidates, config.clustering, 1)
+    rounds = Rounds(game, candidates, candidates, indexed, radii, None, None, config, 1)
+    findings = rounds.merge(rounds.play(log), log)
+    assemble(cloud, frame, scene, indexed, findings, rounds.refused, log.reports, config)
+    candidates_of_windows(frame, explained, radii, config, 1, log)
 
 
 def _practice_frame(points: FloatArray) -> Frame:

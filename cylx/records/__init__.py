@@ -5,10 +5,18 @@ one. All records are frozen: a stage makes new ones and never changes those it w
 """
 
 from cylx.records.candidates import Candidates, Cluster, EllipseFit, Slice
-from cylx.records.clouds import Frame, Ground, Noise, PointCloud, Scene, cell_keys
-from cylx.records.cylinders import CylinderFit, Extraction, Finding, NominalRadius, Refusal, Rejection, Segment
+from cylx.records.clouds import Frame, IndexedCloud, Noise, PointCloud, Scene, cell_keys
+from cylx.records.cylinders import (
+    CylinderFit,
+    Extraction,
+    Finding,
+    NominalRadius,
+    RejectedCylinder,
+    RejectedSegment,
+    Segment,
+)
 from cylx.records.progress import Observer, SilentObserver, StageReport
-from cylx.records.scales import CELL, Explained, Octave
+from cylx.records.scales import CELL, Explained, Scale
 from cylx.records.sources import Crop, Selection, Source
 
 __all__ = [
@@ -22,14 +30,14 @@ __all__ = [
     "Extraction",
     "Finding",
     "Frame",
-    "Ground",
+    "IndexedCloud",
     "Noise",
     "NominalRadius",
     "Observer",
-    "Octave",
     "PointCloud",
-    "Refusal",
-    "Rejection",
+    "RejectedCylinder",
+    "RejectedSegment",
+    "Scale",
     "Scene",
     "Segment",
     "Selection",

@@ -225,11 +225,11 @@ class Frame:
     origin: FloatArray
     spacing: float
 
-    def window_radii(self, octave: float) -> list[float]:
+    def window_radii(self, factor: float) -> list[float]:
         """Give the radii of windows of all scales, ascending, up to an eighth of the cloud's extent."""
         extent = extent_of(self.points)
-        steps = max(1, math.ceil(math.log(max(extent / 8.0 / self.window, 1.0)) / math.log(octave)) + 1)
-        return [self.window * octave**k for k in range(steps)]
+        steps = max(1, math.ceil(math.log(max(extent / 8.0 / self.window, 1.0)) / math.log(factor)) + 1)
+        return [self.window * factor**k for k in range(steps)]
 
     def to_scene(self, cylinder: Cylinder) -> Cylinder:
         """Give a cylinder of the frame in scene units."""
@@ -237,7 +237,7 @@ class Frame:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Ground:
+class IndexedCloud:
     """What cylinders are fitted to: the points in cells, how flat each one's surroundings are, and the noise.
 
     Parameters

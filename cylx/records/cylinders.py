@@ -36,7 +36,7 @@ class Segment:
     spread : float
         Robust standard deviation of its residuals; 0 if it was not fitted.
     covariance : ndarray of shape (5, 5), optional
-        Of two offsets of the axis, its two tilts and the radius, in the frame of `fill_frame`; None before the last
+        Of two offsets of the axis, its two tilts and the radius, in the frame of `fill_basis`; None before the last
         fit.
     choice : Choice, optional
         The entry of a catalogue that was chosen for the radius; None before the last fit, and without a catalogue.
@@ -89,7 +89,7 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Refusal:
+class RejectedSegment:
     """A segment that was not accepted, in the frame of the cloud.
 
     Parameters
@@ -119,7 +119,7 @@ class Refusal:
     measures: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, finding: Finding, reason: str) -> Refusal:
+    def of(cls, finding: Finding, reason: str) -> RejectedSegment:
         """Take back a finding."""
         confidence, coverage = finding.confidence, finding.coverage
         return cls(finding.segment, reason, finding.support, finding.payoff, confidence, coverage, finding.measures)
@@ -174,7 +174,7 @@ class CylinderFit:
     evidence : mapping of str to float
         What the verification measured, by the name of the test.
     covariance : ndarray of shape (5, 5) or None
-        Of two offsets of the axis at its point, along the two directions of `cylx.geometry.cylinder.axis_frame`, of
+        Of two offsets of the axis at its point, along the two directions of `cylx.geometry.cylinder.axis_basis`, of
         two tilts of the axis towards them, and of the radius; scene units and radians. None if it was not computed.
     nominal : NominalRadius or None
         What the catalogue has for it; None without a catalogue or a covariance.
@@ -203,7 +203,7 @@ class CylinderFit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Rejection:
+class RejectedCylinder:
     """What was taken for a cylinder and not accepted.
 
     Parameters
@@ -242,7 +242,7 @@ class Extraction:
         The resolved configuration: nothing in it is None that the run depended on.
     warnings : tuple of str
         What a user should know before trusting the answer.
-    rejected : tuple of Rejection
+    rejected : tuple of RejectedCylinder
         What was not accepted, ordered by confidence, then inliers, descending; what was not measured comes last. The
         like of one refused segment may be in it more than once.
     """
@@ -255,7 +255,7 @@ class Extraction:
     stages: tuple[StageReport, ...]
     config: Config
     warnings: tuple[str, ...] = ()
-    rejected: tuple[Rejection, ...] = ()
+    rejected: tuple[RejectedCylinder, ...] = ()
 
     def __repr__(self) -> str:
         count = len(self.cylinders)

@@ -25,7 +25,7 @@ CELL = 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Octave:
+class Scale:
     """The points that windows of one radius see: one of each voxel, a sixth to a twelfth of the radius wide.
 
     Parameters
@@ -60,7 +60,7 @@ class Octave:
     runs: IndexArray
 
     @classmethod
-    def of(cls, frame: Frame, radius: float, keep: MaskArray) -> Octave:
+    def of(cls, frame: Frame, radius: float, keep: MaskArray) -> Scale:
         """Thin the points to keep of a frame for windows of a radius."""
         level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window)))
         members, voxels, runs = _without_slivers(*group(frame.codes, level, keep))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.cylinder import Cylinder, axis_frame, cylinder_coordinates
+from cylx.geometry.cylinder import Cylinder, axis_basis, cylinder_coordinates
 
 FloatArray = NDArray[np.float64]
 
@@ -92,5 +92,5 @@ def _cells(cylinder: Cylinder, count: int, most: int) -> tuple[int, int]:
 def _zero(cylinder: Cylinder) -> tuple[str, float]:
     """Choose what the angle 0 is turned to: up, or x for a cylinder that stands; and its angle in the frame."""
     name, axis = ("z", 2) if abs(cylinder.direction[2]) < 0.9 else ("x", 0)
-    across, along = axis_frame(cylinder.direction)
+    across, along = axis_basis(cylinder.direction)
     return name, float(np.arctan2(along[axis], across[axis]))

@@ -16,7 +16,7 @@ from cylx.palette import cylinder_colors
 from cylx.report.page import page_of
 from cylx.report.page_data import maps_of, view_of
 from cylx.report.plots import with_deviation
-from cylx.report.view import Scenery
+from cylx.report.view import View
 from cylx.results import Result
 
 if TYPE_CHECKING:
@@ -94,22 +94,22 @@ def show(
     ValueError
         If the points have not the shape (N, 3).
     """
-    scenery = Scenery.of(found, cloud)
+    view = View.of(found, cloud)
     result = found if isinstance(found, Result) else Result.of(found)
     text = repr(found)
     parts = [f"<div><strong>{_text(text)}</strong></div>", _table(result)]
-    if len(scenery.points) or scenery.shapes:
-        page = page_of(_glance(result, scenery.thinned(max(ENOUGH, most_points)), most_points))
+    if len(view.points) or view.shapes:
+        page = page_of(_glance(result, view.thinned(max(ENOUGH, most_points)), most_points))
         style = f"width: 100%; height: {int(height)}px; border: 0"
         frame = f"<iframe sandbox='allow-scripts' title='the cylinders in 3-D' style='{style}'"
         parts.append(f"{frame} srcdoc='{escape(page)}'></iframe>")
     return NotebookView("\n".join(parts), text)
 
 
-def _glance(result: Result, scenery: Scenery, most_points: int) -> dict[str, Any]:
+def _glance(result: Result, view: View, most_points: int) -> dict[str, Any]:
     """Gather what the page in the frame says: the result, and not how it came about."""
-    scenery = scenery.first(MOST_CYLINDERS)
-    count = len(scenery.shapes)
+    view = view.first(MOST_CYLINDERS)
+    count = len(view.shapes)
     cylinders = [cylinder.to_object() for cylinder in result.cylinders[:count]]
     for cylinder in cylinders:
         cylinder.get("uncertainty", {}).pop("covariance", None)
@@ -117,8 +117,8 @@ def _glance(result: Result, scenery: Scenery, most_points: int) -> dict[str, Any
     return {
         "embedded": True,
         "result": {**content, "cylinders": cylinders},
-        "view": view_of(scenery, most_points),
-        "maps": maps_of(scenery, max(64, MOST_CELLS // max(count, 1))) if (scenery.labels >= 0).any() else [],
+        "view": view_of(view, most_points),
+        "maps": maps_of(view, max(64, MOST_CELLS // max(count, 1))) if (view.labels >= 0).any() else [],
     }
 
 

@@ -9,7 +9,7 @@ import re
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
-from cylx.report.page_data import facts_of
+from cylx.report.page_data import page_data_of
 
 if TYPE_CHECKING:
     from cylx.records import Extraction
@@ -32,16 +32,16 @@ def html_of(extraction: Extraction) -> str:
     str
         HTML, to be written as UTF-8.
     """
-    return page_of(facts_of(extraction))
+    return page_of(page_data_of(extraction))
 
 
-def page_of(facts: dict[str, Any]) -> str:
+def page_of(page_data: dict[str, Any]) -> str:
     """Write the page of what is to be said.
 
     Parameters
     ----------
-    facts : dict
-        A JSON object, as `facts_of` gives it. With `embedded` it has neither `config`, `fields` nor `rejected`, and the
+    page_data : dict
+        A JSON object, as `page_data_of` gives it. With `embedded` it has neither `config`, `fields` nor `rejected`, and the
         page is the view and the details alone, for a frame in another page.
 
     Returns
@@ -54,7 +54,7 @@ def page_of(facts: dict[str, Any]) -> str:
         "policy": f"default-src 'none'; script-src '{_digest(script)}'; style-src '{_digest(style)}'; base-uri 'none'; "
         "form-action 'none'",
         "style": style,
-        "data": json_for_script(facts),
+        "data": json_for_script(page_data),
         "script": script,
     }
     pieces = re.split(r"\{\{(\w+)\}\}", _read("page.html"))  # at once: nothing in a part is looked at again

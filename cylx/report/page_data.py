@@ -12,7 +12,7 @@ from cylx.config import plain_yaml
 from cylx.palette import cylinder_colors
 from cylx.report.maps import MOST_CELLS, unroll
 from cylx.report.points import choose_points, pack_labels, pack_residuals, quantise
-from cylx.report.view import Scenery
+from cylx.report.view import View
 from cylx.results import RejectedCylinder, Result
 from cylx.results.parts import drop_missing
 
@@ -26,7 +26,7 @@ NOISES = 8.0
 _OUTLYING = 0.005  # share of the points at either end of a coordinate that the first look need not show
 
 
-def facts_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str, Any]:
+def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str, Any]:
     """Gather what a report says.
 
     Parameters
@@ -44,7 +44,7 @@ def facts_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str
     """
     result = Result.of(extraction).to_object()
     del result["config"]
-    scenery = Scenery.of(extraction)
+    view = View.of(extraction)
     table = extraction.cloud.table
     rejected = [RejectedCylinder.of(one).model_dump(mode="json") for one in extraction.rejected[:MOST_REJECTED]]
     drop_missing(rejected)
@@ -54,17 +54,17 @@ def facts_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str
         "fields": ["x", "y", "z"] if table is None else list(table.dtype.names or ()),
         "rejected": rejected,
         "rejected_count": len(extraction.rejected),
-        "view": view_of(scenery, most_points),
-        "maps": maps_of(scenery),
+        "view": view_of(view, most_points),
+        "maps": maps_of(view),
     }
 
 
-def view_of(scenery: Scenery, most_points: int) -> dict[str, Any]:
+def view_of(view: View, most_points: int) -> dict[str, Any]:
     """Give what is drawn: points, and cylinders relative to the middle of the box.
 
     Parameters
     ----------
-    scenery : Scenery
+    view : View
         With points, or with cylinders, or with both.
     most_points : int
         Most points drawn.
@@ -74,38 +74,38 @@ def view_of(scenery: Scenery, most_points: int) -> dict[str, Any]:
     dict
         A JSON object, as `viewer.js` reads it.
     """
-    chosen = choose_points(scenery.labels, most_points, np.random.default_rng(scenery.seed))
-    points, shapes = scenery.points[chosen], scenery.shapes
+    chosen = choose_points(view.labels, most_points, np.random.default_rng(view.seed))
+    points, shapes = view.points[chosen], view.shapes
     corners = points if len(points) else np.array([end for shape in shapes for end in (shape.start, shape.end)])
     steps, low, size = quantise(corners)
     middle = low + 0.5 * size
-    unit = _unit(scenery)
-    labels = pack_labels(scenery.labels[chosen], len(shapes))
+    unit = _unit(view)
+    labels = pack_labels(view.labels[chosen], len(shapes))
     tubes = [[*(shape.start - middle), *(shape.end - middle), shape.radius] for shape in shapes]
     return {
         "count": len(chosen),
-        "total": len(scenery.points),
+        "total": len(view.points),
         "low": low.tolist(),
         "size": size.tolist(),
         "home": _home(corners - middle, np.array(tubes).reshape(-1, 7)),
-        "spacing": scenery.spacing * float(np.sqrt(len(scenery.points) / max(len(chosen), 1))),
+        "spacing": view.spacing * float(np.sqrt(len(view.points) / max(len(chosen), 1))),
         "noise": unit,
         "noises": NOISES,
         "points": _packed(steps[: len(chosen)]),
         "labels": _packed(labels),
         "label_bytes": labels.itemsize,
-        "residuals": _packed(pack_residuals(scenery.residuals[chosen].astype(np.float64), NOISES * unit)),
-        "colors": None if scenery.colors is None else _packed(scenery.colors[chosen]),
+        "residuals": _packed(pack_residuals(view.residuals[chosen].astype(np.float64), NOISES * unit)),
+        "colors": None if view.colors is None else _packed(view.colors[chosen]),
         "palette": _packed(cylinder_colors(np.arange(len(shapes)))),
         "cylinders": np.array(tubes).tolist(),
     }
 
 
-def _unit(scenery: Scenery) -> float:
+def _unit(view: View) -> float:
     """Give the noise, or what stands for it where the points have none."""
-    residuals = scenery.residuals[np.isfinite(scenery.residuals)].astype(np.float64)
+    residuals = view.residuals[np.isfinite(view.residuals)].astype(np.float64)
     scatter = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else 0.0
-    return scenery.noise or scatter or 1.0
+    return view.noise or scatter or 1.0
 
 
 def _home(points: NDArray[np.float64], shapes: NDArray[np.float64]) -> dict[str, Any]:
@@ -117,12 +117,12 @@ def _home(points: NDArray[np.float64], shapes: NDArray[np.float64]) -> dict[str,
     return {"center": (0.5 * (low + high)).tolist(), "radius": float(np.linalg.norm(high - low) / 2) or 1.0}
 
 
-def maps_of(scenery: Scenery, most_cells: int = MOST_CELLS) -> list[dict[str, Any]]:
+def maps_of(view: View, most_cells: int = MOST_CELLS) -> list[dict[str, Any]]:
     """Unroll every cylinder, with all of its points.
 
     Parameters
     ----------
-    scenery : Scenery
+    view : View
     most_cells : int
         Of one map.
 
@@ -131,14 +131,14 @@ def maps_of(scenery: Scenery, most_cells: int = MOST_CELLS) -> list[dict[str, An
     list of dict
         A JSON object a cylinder, as `panels.js` reads it.
     """
-    order = np.argsort(scenery.labels, kind="stable")
-    ends = np.searchsorted(scenery.labels[order], np.arange(len(scenery.shapes) + 1))
+    order = np.argsort(view.labels, kind="stable")
+    ends = np.searchsorted(view.labels[order], np.arange(len(view.shapes) + 1))
     maps = []
-    for number, shape in enumerate(scenery.shapes):
+    for number, shape in enumerate(view.shapes):
         own = order[ends[number] : ends[number + 1]]
-        own = own[np.isfinite(scenery.residuals[own])]
-        residuals = scenery.residuals[own].astype(np.float64)
-        found = unroll(scenery.points[own], residuals, shape, scenery.noise, most_cells)
+        own = own[np.isfinite(view.residuals[own])]
+        residuals = view.residuals[own].astype(np.float64)
+        found = unroll(view.points[own], residuals, shape, view.noise, most_cells)
         rows, columns = found.means.shape
         maps.append(
             {

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.optional.matplotlib import new_figure
 from cylx.palette import cylinder_colors
 from cylx.report.points import choose_points
-from cylx.report.view import Scenery
+from cylx.report.view import View
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,12 +75,12 @@ def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None 
     UsageError
         If matplotlib is not installed, or a cloud is given with an extraction.
     """
-    scenery = Scenery.of(found, cloud)
+    view = View.of(found, cloud)
     canvas = new_figure(INCHES, DPI)
     axes: Any = canvas.add_axes((0.02, 0.02, 0.94, 0.92), projection="3d", elev=ELEVATION, azim=AZIMUTH)
-    chosen = choose_points(scenery.labels, MOST_POINTS, np.random.default_rng(scenery.seed))
-    points, labels = scenery.points[chosen], scenery.labels[chosen]
-    lines = [outline(shape) for shape in scenery.shapes]
+    chosen = choose_points(view.labels, MOST_POINTS, np.random.default_rng(view.seed))
+    points, labels = view.points[chosen], view.labels[chosen]
+    lines = [outline(shape) for shape in view.shapes]
     if len(points):
         low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
         shown = ((points >= low) & (points <= high)).all(axis=1) | (labels >= 0)
@@ -95,8 +95,8 @@ def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None 
             axes.plot(*line.T, color=color, linewidth=1.0)
     if len(points):
         _frame(axes, points)
-    count = len(scenery.shapes)
-    title = f"{_printable(scenery.name)}: {count} cylinder{'' if count == 1 else 's'}"
+    count = len(view.shapes)
+    title = f"{_printable(view.name)}: {count} cylinder{'' if count == 1 else 's'}"
     canvas.suptitle(title, fontsize=13, parse_math=False)
     return canvas
 
@@ -112,7 +112,7 @@ def outline(cylinder: Cylinder) -> list[NDArray[np.float64]]:
     -------
     list of ndarray of shape (n, 3)
     """
-    across, along = axis_frame(cylinder.direction)
+    across, along = axis_basis(cylinder.direction)
     angles = np.linspace(0, 2 * np.pi, _AROUND + 1)
     circle = cylinder.radius * (np.outer(np.cos(angles), across) + np.outer(np.sin(angles), along))
     rims = [cylinder.start + circle, cylinder.end + circle]

@@ -13,7 +13,7 @@ from cylx.optional.matplotlib import new_figure
 from cylx.palette import cylinder_colors
 from cylx.records import Extraction
 from cylx.report.maps import EMPTY, unroll
-from cylx.report.view import Scenery
+from cylx.report.view import View
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,17 +53,17 @@ def plot_residuals(
     UsageError
         If there is no such cylinder, it has no points, or matplotlib is not installed.
     """
-    scenery = Scenery.of(found, cloud)
-    count = len(scenery.shapes)
+    view = View.of(found, cloud)
+    count = len(view.shapes)
     if not 0 <= cylinder < count:
         ids = f"its ids are 0 to {count - 1}" if count else "it has none"
         raise UsageError("cylinder", f"there is no cylinder {cylinder}", f"choose another; {ids}")
-    own = (scenery.labels == cylinder) & np.isfinite(scenery.residuals)
+    own = (view.labels == cylinder) & np.isfinite(view.residuals)
     if not own.any():
         remedy = "give the annotated cloud, as cylx.read_cloud('scan.annotated.ply')"
         raise UsageError("cloud", f"it has no points of cylinder {cylinder}", remedy)
-    shape = scenery.shapes[cylinder]
-    unrolled = unroll(scenery.points[own], scenery.residuals[own].astype(np.float64), shape, scenery.noise)
+    shape = view.shapes[cylinder]
+    unrolled = unroll(view.points[own], view.residuals[own].astype(np.float64), shape, view.noise)
     means = np.where(unrolled.means == EMPTY, np.nan, unrolled.means / 127.0 * unrolled.reach)
     figure = new_figure((7.2, 4.8), DPI, layout="constrained")
     axes: Any = figure.add_subplot()

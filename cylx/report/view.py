@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Scenery:
+class View:
     """Cylinders and the points about them.
 
     Parameters
@@ -58,7 +58,7 @@ class Scenery:
     seed: int = 0
 
     @classmethod
-    def of(cls, found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> Scenery:
+    def of(cls, found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> View:
         """Put together what there is to see.
 
         Parameters
@@ -102,7 +102,7 @@ class Scenery:
         scale = found.scene
         return cls(found.input.file, shapes, cloud.points, labels, residuals, colors, scale.spacing, scale.noise)
 
-    def thinned(self, most: int) -> Scenery:
+    def thinned(self, most: int) -> View:
         """Give about `most` of the points, at equal steps of their order."""
         step = max(1, len(self.points) // max(most, 1))
         if step == 1:
@@ -117,7 +117,7 @@ class Scenery:
             spacing=self.spacing * math.sqrt(step),
         )
 
-    def first(self, count: int) -> Scenery:
+    def first(self, count: int) -> View:
         """Give the first cylinders and all points; those of other cylinders are of none."""
         if len(self.shapes) <= count:
             return self

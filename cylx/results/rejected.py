@@ -14,7 +14,7 @@ from cylx.results.result import Measured
 from cylx.version import __version__
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, Rejection
+    from cylx.records import Extraction, RejectedCylinder
 
 
 class Reasoned(Part):
@@ -28,7 +28,7 @@ class RejectedCylinder(Measured, Reasoned):  # the keys of the last one come fir
     """A shape that was taken for a cylinder, why it was not accepted, and what was measured of it until then."""
 
     @classmethod
-    def of(cls, rejection: Rejection) -> RejectedCylinder:
+    def of(cls, rejection: RejectedCylinder) -> RejectedCylinder:
         """Write down what was not accepted."""
         return cls(reason=rejection.reason, **cls.keys_of(rejection.fit))
 

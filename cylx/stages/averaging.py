@@ -18,11 +18,11 @@ from cylx.config import AveragingConfig
 from cylx.fits.conditioning import given_radius
 from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.fits.nominal_radius import Catalogue, choose_entry
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder, unbiased_radius
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder, unbiased_radius
 from cylx.geometry.cylinder import cylinder_coordinates, points_on
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import visible_extent
-from cylx.records import Candidates, Cluster, Ground, Segment
+from cylx.records import Candidates, Cluster, IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -89,14 +89,14 @@ def average_cluster(candidates: Candidates, cluster: Cluster, config: AveragingC
     return Segment(model, 0.5 * (high - low), 0.0)
 
 
-def refine(segment: Segment, ground: Ground) -> Segment | str:
+def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
     """Fit a rough cylinder to the cloud and let it grow along its axis until the surface ends.
 
     Parameters
     ----------
     segment : Segment
         The start.
-    ground : Ground
+    indexed : IndexedCloud
         The cloud.
 
     Returns
@@ -105,20 +105,20 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
         The fitted cylinder with its visible extent, or why there is none.
     """
     model, half = segment.model, segment.half
-    noise = ground.noise_about(model, half)
+    noise = indexed.noise_about(model, half)
     first = model
     for step in range(GROWTH_STEPS):
         beyond = max(1.5 * model[6], 0.7 * half) if step else 0.5 * model[6]
         shell = max(0.12 * model[6] if step == 0 else 0.05 * model[6], 5.0 * noise)
         width = shell + 8.0 * noise
         strict = DOUBTFUL if model[6] > WIDE else 1.0
-        points = _own_points(ground, model, half + beyond, width, MANY, strict)
+        points = _own_points(indexed, model, half + beyond, width, MANY, strict)
         if len(points) < 20:
             return "too few points"
         stride = max(1, len(points) // ENOUGH)
-        kernel = Kernel(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH)
+        schedule = WeightSchedule(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH)
         end = BEYOND * half
-        fit = fit_cylinder(points[::stride], model, low=-end, high=end, kernel=kernel, steps=12 if step else 25)
+        fit = fit_cylinder(points[::stride], model, low=-end, high=end, schedule=schedule, steps=12 if step else 25)
         if fit is None:
             return "no fit"
         model, spread = fit
@@ -137,16 +137,16 @@ def refine(segment: Segment, ground: Ground) -> Segment | str:
             return "too short"
         if step and abs(half - before) < 0.01 * before + 0.01 * model[6]:
             break
-    return refit(Segment(model, half, noise), ground, most=MANY)
+    return refit(Segment(model, half, noise), indexed, most=MANY)
 
 
-def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment | str:
+def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> Segment | str:
     """Fit a cylinder to its points between its ends, to the fixed point of the robust estimate.
 
     Parameters
     ----------
     segment : Segment
-    ground : Ground
+    indexed : IndexedCloud
     most : int, optional
         Points that suffice; all by default.
 
@@ -155,7 +155,7 @@ def refit(segment: Segment, ground: Ground, most: int | None = None) -> Segment 
     Segment or str
         With the bias of the radius taken off; or why there is none.
     """
-    fit = _robust_fit(*_shell(segment, ground, most), segment, ground, steps=15 if most else 60)
+    fit = _robust_fit(*_shell(segment, indexed, most), segment, indexed, steps=15 if most else 60)
     if fit is None:
         return "no fit"
     model, spread = fit
@@ -175,7 +175,7 @@ def inflation(measures: Mapping[str, float]) -> float:
 
 def finish(
     segment: Segment,
-    ground: Ground,
+    indexed: IndexedCloud,
     known: Prior | None = None,
     catalogue: Catalogue | None = None,
     *,
@@ -189,7 +189,7 @@ def finish(
     Parameters
     ----------
     segment : Segment
-    ground : Ground
+    indexed : IndexedCloud
     known : Prior, optional
     catalogue : Catalogue, optional
         Nominal radii, in the unit of the cloud's frame.
@@ -204,8 +204,8 @@ def finish(
         With its covariance, not inflated; that of `refit` without one if the points are too few for it; or why there
         is none.
     """
-    points, width = _shell(segment, ground, None)
-    fit = _robust_fit(points, width, segment, ground, steps=15, tolerance=ROUGH)
+    points, width = _shell(segment, indexed, None)
+    fit = _robust_fit(points, width, segment, indexed, steps=15, tolerance=ROUGH)
     if fit is None:
         return "no fit"
     model, spread = fit
@@ -214,11 +214,11 @@ def finish(
     limits = {"low": -end, "high": end, "width": min(SURE * deviation, 2.0 * width), "deviation": deviation}
     likely = fit_mixture(points, model, **limits)
     if likely is None:
-        return refit(segment, ground)
+        return refit(segment, indexed)
     prior = None if known is None else known.as_far_as_borne_out(likely)
     robust = inflated > 1.0 and prior is None
     if robust:
-        fitted = refit(segment, ground)
+        fitted = refit(segment, indexed)
         if isinstance(fitted, str):
             return fitted
         free = replace(fitted, covariance=likely.covariance)
@@ -249,31 +249,31 @@ def _turn_as_given(model: FloatArray) -> None:
     model[3:6] *= np.sign(model[3 + int(np.abs(model[3:6]).argmax())])
 
 
-def _shell(segment: Segment, ground: Ground, most: int | None) -> tuple[FloatArray, float]:
+def _shell(segment: Segment, indexed: IndexedCloud, most: int | None) -> tuple[FloatArray, float]:
     """Give the points about the surface of a segment, and how near to it those lie that have a say at first."""
-    width = max(4.0 * ground.noise_about(segment.model, segment.half), 0.02 * segment.model[6])
-    return _own_points(ground, segment.model, BEYOND * segment.half, 2.0 * width, most), width
+    width = max(4.0 * indexed.noise_about(segment.model, segment.half), 0.02 * segment.model[6])
+    return _own_points(indexed, segment.model, BEYOND * segment.half, 2.0 * width, most), width
 
 
 def _robust_fit(
-    points: FloatArray, width: float, segment: Segment, ground: Ground, *, steps: int, tolerance: float = 1e-9
+    points: FloatArray, width: float, segment: Segment, indexed: IndexedCloud, *, steps: int, tolerance: float = 1e-9
 ) -> tuple[FloatArray, float] | None:
     """Fit a cylinder to the points of a segment; give it and the standard deviation about it."""
-    noise, end = ground.noise_about(segment.model, segment.half), BEYOND * segment.half
-    kernel = Kernel(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, tolerance)
+    noise, end = indexed.noise_about(segment.model, segment.half), BEYOND * segment.half
+    schedule = WeightSchedule(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, tolerance)
     if len(points) < 20:
         return None
-    fit = fit_cylinder(points, segment.model, low=-end, high=end, kernel=kernel, steps=steps)
+    fit = fit_cylinder(points, segment.model, low=-end, high=end, schedule=schedule, steps=steps)
     return None if fit is None else (fit[0], fit[1] * TUKEY_SPREAD)
 
 
-def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
+def measure_extent(segment: Segment, indexed: IndexedCloud) -> Segment | str:
     """Find the visible extent of a cylinder that is left as the candidates averaged it.
 
     Parameters
     ----------
     segment : Segment
-    ground : Ground
+    indexed : IndexedCloud
 
     Returns
     -------
@@ -283,14 +283,14 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
     model, radius = segment.model, float(segment.model[6])
     reach = max(segment.half, radius) * 4.0
     # the average is as good as its candidates, so its surface is looked for in a wider shell than a fitted one's
-    width = max(5.0 * ground.noise_about(model, segment.half), 0.05 * radius)
+    width = max(5.0 * indexed.noise_about(model, segment.half), 0.05 * radius)
     half = max(segment.half, 0.5 * radius)
     low = high = 0.0
     heights = distances = np.empty(0)
     for _ in range(GROWTH_STEPS):
-        near = ground.cells.near_cylinder(model, -reach, reach, max(0.0, radius - width), radius + width)
-        near = near[ground.may_be_on(near, radius)]
-        heights, distances, angles = cylinder_coordinates(ground.points[near], model[:3], model[3:6])
+        near = indexed.cells.near_cylinder(model, -reach, reach, max(0.0, radius - width), radius + width)
+        near = near[indexed.may_be_on(near, radius)]
+        heights, distances, angles = cylinder_coordinates(indexed.points[near], model[:3], model[3:6])
         found = visible_extent(heights, angles, half, radius)
         if found is None:
             return "too few points"
@@ -307,7 +307,7 @@ def measure_extent(segment: Segment, ground: Ground) -> Segment | str:
 
 
 def _own_points(
-    ground: Ground, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
+    indexed: IndexedCloud, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
 ) -> FloatArray:
     """Give the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
-    return ground.cells.surface_points(model, half, width, most, ground.flatness, strict * ground.too_flat(model[6]))
+    return indexed.cells.surface_points(model, half, width, most, indexed.flatness, strict * indexed.too_flat(model[6]))

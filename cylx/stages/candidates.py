@@ -90,13 +90,13 @@ def polish_candidates(
     rows = np.zeros((len(candidates), 9))
     rows[:, :7] = candidates.models
     kept = np.zeros(len(candidates), np.bool_)
-    octave = np.log2(np.maximum(candidates.radii / frame.window, 1.0)).astype(np.int64)
-    for level in np.unique(octave):
+    size_class = np.log2(np.maximum(candidates.radii / frame.window, 1.0)).astype(np.int64)
+    for level in np.unique(size_class):
         sample = thin(frame.codes, frame.voxel_level + int(level))
         cells, starts = cell_starts(frame.codes[sample], frame.voxel_level + int(level) + 3)
         side = frame.unit * 2.0 ** (frame.voxel_level + int(level) + 3)
         noise = frame.noise.at(frame.window * 2.0 ** int(level))
-        which = np.flatnonzero(octave == level)
+        which = np.flatnonzero(size_class == level)
         part, good = rows[which], np.zeros(len(which), np.bool_)
         _polish(
             frame.points[sample], cells, starts, side, noise, *radius_range, config.min_inliers, config.min_share,

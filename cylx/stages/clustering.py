@@ -162,13 +162,17 @@ def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:
     """
     if len(candidates) == 0:
         return candidates
-    octave = np.floor(np.log(candidates.radii) / math.log(1.25))
-    side = 0.5 * 1.25**octave
+    size_class = np.floor(np.log(candidates.radii) / math.log(1.25))
+    side = 0.5 * 1.25**size_class
     signs = np.where(
         candidates.directions[np.arange(len(candidates)), np.abs(candidates.directions).argmax(1)] < 0, -1, 1
     )
     key = np.column_stack(
-        [octave, np.floor(candidates.points / side[:, None]), np.round(2.0 * candidates.directions * signs[:, None])]
+        [
+            size_class,
+            np.floor(candidates.points / side[:, None]),
+            np.round(2.0 * candidates.directions * signs[:, None]),
+        ]
     ).astype(np.int64)
     order = np.lexsort((-candidates.inliers, *key.T))
     same = (key[order][1:] == key[order][:-1]).all(axis=1)

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.morton import cell_starts, gather_ball
-from cylx.geometry.numerics import fill_frame
+from cylx.geometry.numerics import fill_basis
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
-from cylx.records import CELL, Candidates, Explained, Frame, Octave, StageReport
+from cylx.records import CELL, Candidates, Explained, Frame, Scale, StageReport
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -64,16 +64,16 @@ def find_curved_windows(
     parts: list[Candidates] = []
     counts = np.zeros(len(OUTCOMES), np.int64)
     for radius in reversed(frame.window_radii(config.octave)):
-        octave = Octave.of(frame, radius, explained.flatness == 0)
-        if len(octave.points) < LEAST_POINTS:
+        scale = Scale.of(frame, radius, explained.flatness == 0)
+        if len(scale.points) < LEAST_POINTS:
             continue
-        seeds = octave.seeds(FEW_SEEDS, least=LONELY)
-        rows, outcome, planes, marks = _look(frame, octave, seeds, radius_range, config, threads)
+        seeds = scale.seeds(FEW_SEEDS, least=LONELY)
+        rows, outcome, planes, marks = _look(frame, scale, seeds, radius_range, config, threads)
         counts += np.bincount(outcome, minlength=len(OUTCOMES))
-        octave.spread(marks, explained.curved)
+        scale.spread(marks, explained.curved)
         flat = outcome == 1
         if flat.any():
-            _mark_flat(frame, octave, seeds[flat], planes[flat], explained.flatness)
+            _mark_flat(frame, scale, seeds[flat], planes[flat], explained.flatness)
         parts.append(Candidates.of_windows(rows[outcome == 5], radius))
     found = Candidates.joined(parts)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:5], counts[:5], strict=True) if n}
@@ -82,7 +82,7 @@ def find_curved_windows(
 
 def _look(
     frame: Frame,
-    octave: Octave,
+    scale: Scale,
     seeds: IndexArray,
     radius_range: tuple[float, float],
     config: CandidatesConfig,
@@ -90,8 +90,8 @@ def _look(
 ) -> tuple[FloatArray, IndexArray, FloatArray, MaskArray]:
     """Look through the windows about all seeds, in chunks over threads."""
     rows, planes = np.zeros((len(seeds), COLUMNS)), np.zeros((len(seeds), 6))
-    outcome, marks = np.zeros(len(seeds), np.int64), np.zeros(len(octave.points), np.bool_)
-    noises = frame.noise.about(octave.points[seeds], 2.0 * octave.radius)
+    outcome, marks = np.zeros(len(seeds), np.int64), np.zeros(len(scale.points), np.bool_)
+    noises = frame.noise.about(scale.points[seeds], 2.0 * scale.radius)
     chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 64)))
 
     def work(chunk: IndexArray) -> None:
@@ -99,12 +99,12 @@ def _look(
             return
         first, last = int(chunk[0]), int(chunk[-1]) + 1
         _scan(
-            octave.points,
-            octave.cells,
-            octave.starts,
-            octave.side,
+            scale.points,
+            scale.cells,
+            scale.starts,
+            scale.side,
             seeds[first:last],
-            octave.radius,
+            scale.radius,
             noises[first:last],
             radius_range[0],
             radius_range[1],
@@ -205,25 +205,25 @@ def _mark_explained(
     n: int,
     model: FloatArray,
     width: float,
-    frame: FloatArray,
+    basis: FloatArray,
     marks: MaskArray,
 ) -> None:
     """Mark the points of a window that lie on its cylinder; threads may mark the same ones, which does no harm."""
-    fill_frame(model[3:6], frame)
+    fill_basis(model[3:6], basis)
     for i in range(n):
         dx, dy, dz = xyz[0, i] - model[0], xyz[1, i] - model[1], xyz[2, i] - model[2]
-        x = dx * frame[0, 0] + dy * frame[0, 1] + dz * frame[0, 2]
-        y = dx * frame[1, 0] + dy * frame[1, 1] + dz * frame[1, 2]
+        x = dx * basis[0, 0] + dy * basis[0, 1] + dz * basis[0, 2]
+        y = dx * basis[1, 0] + dy * basis[1, 1] + dz * basis[1, 2]
         if abs(math.sqrt(x * x + y * y) - model[6]) < width:
             marks[found[i]] = True
 
 
-def _mark_flat(frame: Frame, octave: Octave, seeds: IndexArray, planes: FloatArray, flatness: FloatArray) -> None:
+def _mark_flat(frame: Frame, scale: Scale, seeds: IndexArray, planes: FloatArray, flatness: FloatArray) -> None:
     """Give the points about flat windows, within three noises of their planes, the radius of the window."""
-    cells, starts = cell_starts(frame.codes, octave.level + CELL)
-    places = octave.points[seeds]
-    widths = 3.0 * frame.noise.about(places, 2.0 * octave.radius)
-    _mark(frame.points, cells, starts, octave.side, places, planes, 2.0 * octave.radius, widths, flatness)
+    cells, starts = cell_starts(frame.codes, scale.level + CELL)
+    places = scale.points[seeds]
+    widths = 3.0 * frame.noise.about(places, 2.0 * scale.radius)
+    _mark(frame.points, cells, starts, scale.side, places, planes, 2.0 * scale.radius, widths, flatness)
 
 
 @njit(cache=True, nogil=True)

@@ -13,9 +13,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.cylinder import coordinates_of
-from cylx.records import Finding, Ground, Segment
+from cylx.records import Finding, IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
 Judge = Callable[[Segment, Finding], Finding | None]
@@ -38,14 +38,14 @@ LESS = 0.1
 """How much less confident the longer one may be."""
 
 
-def extend(finding: Finding, ground: Ground, judge: Judge) -> Finding:
+def extend(finding: Finding, indexed: IndexedCloud, judge: Judge) -> Finding:
     """Let a cylinder go on at both ends for as long as there are points on it and next to none beside it.
 
     Parameters
     ----------
     finding : Finding
         Accepted.
-    ground : Ground
+    indexed : IndexedCloud
         The cloud.
     judge : callable
         Refits and verifies a segment, in the light of what it was; None if it does not pass.
@@ -56,47 +56,47 @@ def extend(finding: Finding, ground: Ground, judge: Judge) -> Finding:
         The longer one, or the same.
     """
     for _ in range(ROUNDS):
-        judged = next((one for times in FURTHER if (one := _longer(finding, ground, judge, times))), None)
+        judged = next((one for times in FURTHER if (one := _longer(finding, indexed, judge, times))), None)
         if judged is None:
             break
         finding = judged
     return finding
 
 
-def _longer(finding: Finding, ground: Ground, judge: Judge, times: float) -> Finding | None:
+def _longer(finding: Finding, indexed: IndexedCloud, judge: Judge, times: float) -> Finding | None:
     """Give a cylinder with what lies within so many times its length, if it passes as well as before."""
-    longer = _lengthened(finding, ground, times)
+    longer = _lengthened(finding, indexed, times)
     judged = None if longer is None else judge(longer, finding)
     return judged if judged is not None and judged.confidence >= finding.confidence - LESS else None
 
 
-def _lengthened(finding: Finding, ground: Ground, times: float) -> Segment | None:
+def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segment | None:
     """Fit a cylinder to a piece and what lies beyond its ends; None if that is next to nothing."""
     model, half = finding.segment.model, finding.segment.half
-    noise = ground.noise_about(model, half)
+    noise = indexed.noise_about(model, half)
     allowed = (REACH * model[6]) ** 2 - finding.offset_error**2
     reach = min(math.sqrt(max(allowed, 0.0)) / max(finding.tilt_error, 1e-12), times * half)
     if reach < half + model[6]:
         return None
     outer = model[6] + max(0.5 * model[6], 10.0 * noise)
-    near = ground.cells.near_cylinder(model, -reach, reach, 0.0, outer)
-    near = near[ground.may_be_on(near, model[6])]
-    heights, residuals, _ = coordinates_of(ground.points, near, model)
+    near = indexed.cells.near_cylinder(model, -reach, reach, 0.0, outer)
+    near = near[indexed.may_be_on(near, model[6])]
+    heights, residuals, _ = coordinates_of(indexed.points, near, model)
     astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
     fresh = (np.abs(heights) > half) & (np.abs(residuals) < 3.0 * noise + 2.0 * astray)
     if fresh.sum() < BEYOND:
         return None
-    points = ground.points[np.concatenate([finding.points, near[fresh]])]
+    points = indexed.points[np.concatenate([finding.points, near[fresh]])]
     shell = max(3.0 * noise, 2.0 * float(astray.max()))
-    kernel = Kernel(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-    fit = fit_cylinder(points, model, low=-reach, high=reach, kernel=kernel, steps=30)
+    schedule = WeightSchedule(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+    fit = fit_cylinder(points, model, low=-reach, high=reach, schedule=schedule, steps=30)
     if fit is None:
         return None
     longer, spread = fit
     spread *= TUKEY_SPREAD
     if spread > 1.1 * max(finding.segment.spread, noise):
         return None
-    heights, residuals, _ = coordinates_of(ground.points, near, longer)
+    heights, residuals, _ = coordinates_of(indexed.points, near, longer)
     on = np.abs(residuals) < 2.0 * noise
     share = longer[6] * 8.0 * noise / (outer**2 - 8.0 * longer[6] * noise)  # of the areas on and beside the surface
     low, high = -_end(-heights, on, half, reach, share), _end(heights, on, half, reach, share)

@@ -6,19 +6,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.geometry.cylinder import cylinder_coordinates
-from cylx.records import Ground, Segment
+from cylx.records import IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 
-def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.int32], FloatArray]:
+def label_points(segments: list[Segment], indexed: IndexedCloud) -> tuple[NDArray[np.int32], FloatArray]:
     """Give each point the cylinder whose surface it is nearest to, within three deviations of it.
 
     Parameters
     ----------
     segments : list of Segment
-    ground : Ground
+    indexed : IndexedCloud
         The cloud; points of something much flatter than a cylinder are not its own.
 
     Returns
@@ -28,24 +28,24 @@ def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.in
     residuals : ndarray of shape (N,)
         Signed distance to that segment's surface, + is outside; NaN for none.
     """
-    labels = np.full(len(ground.points), -1, np.int32)
-    residuals = np.full(len(ground.points), np.nan)
-    nearest = np.full(len(ground.points), np.inf)
+    labels = np.full(len(indexed.points), -1, np.int32)
+    residuals = np.full(len(indexed.points), np.nan)
+    nearest = np.full(len(indexed.points), np.inf)
     for index, segment in enumerate(segments):
-        near, offset, _ = surface_points(segment, ground)
+        near, offset, _ = surface_points(segment, indexed)
         closer = np.abs(offset) < nearest[near]
         near, offset = near[closer], offset[closer]
         labels[near], residuals[near], nearest[near] = index, offset, np.abs(offset)
     return labels, residuals
 
 
-def surface_points(segment: Segment, ground: Ground) -> tuple[IndexArray, FloatArray, FloatArray]:
+def surface_points(segment: Segment, indexed: IndexedCloud) -> tuple[IndexArray, FloatArray, FloatArray]:
     """Give the points within three deviations of a segment's surface that may belong to it.
 
     Parameters
     ----------
     segment : Segment
-    ground : Ground
+    indexed : IndexedCloud
 
     Returns
     -------
@@ -56,10 +56,10 @@ def surface_points(segment: Segment, ground: Ground) -> tuple[IndexArray, FloatA
         About the axis, in (-pi, pi].
     """
     radius = segment.model[6]
-    reach = 3.0 * max(segment.spread, ground.noise_about(segment.model, segment.half))
-    near = ground.cells.near_cylinder(
+    reach = 3.0 * max(segment.spread, indexed.noise_about(segment.model, segment.half))
+    near = indexed.cells.near_cylinder(
         segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
     )
-    near = near[ground.may_be_on(near, radius)]
-    _, distances, angles = cylinder_coordinates(ground.points[near], segment.model[:3], segment.model[3:6])
+    near = near[indexed.may_be_on(near, radius)]
+    _, distances, angles = cylinder_coordinates(indexed.points[near], segment.model[:3], segment.model[3:6])
     return near, distances - radius, angles

@@ -20,8 +20,8 @@ from cylx.geometry.circle import search_circle
 from cylx.geometry.ellipse import conic_shape, search_conic
 from cylx.geometry.lines import fit_line, off_line
 from cylx.geometry.morton import gather_ball
-from cylx.geometry.numerics import fill_frame
-from cylx.records import Candidates, Explained, Frame, Octave
+from cylx.geometry.numerics import fill_basis
+from cylx.records import Candidates, Explained, Frame, Scale
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -76,15 +76,13 @@ def slice_windows(
     parts: list[Candidates] = []
     totals = np.zeros(len(COUNTS), np.int64)
     for radius in reversed(frame.window_radii(octave_ratio)):
-        octave = Octave.of(frame, radius, explained.flatness == 0)
-        if len(octave.points) < FEWEST:
+        scale = Scale.of(frame, radius, explained.flatness == 0)
+        if len(scale.points) < FEWEST:
             continue
-        open_points = ~explained.curved[octave.indices]
-        seeds = octave.seeds(config.windows // 2, open_points)
+        open_points = ~explained.curved[scale.indices]
+        seeds = scale.seeds(config.windows // 2, open_points)
         stride = max(1, math.ceil(len(seeds) / config.windows))
-        rows, counts = _look(
-            frame, octave, seeds[::stride], radius_range, config.local_planes, supported, seed, threads
-        )
+        rows, counts = _look(frame, scale, seeds[::stride], radius_range, config.local_planes, supported, seed, threads)
         totals += counts
         parts.append(Candidates.of_windows(rows[rows[:, 7] > 0], radius))
     return Candidates.joined(parts), dict(zip(COUNTS, totals.tolist(), strict=True))
@@ -92,7 +90,7 @@ def slice_windows(
 
 def _look(
     frame: Frame,
-    octave: Octave,
+    scale: Scale,
     seeds: IndexArray,
     radius_range: tuple[float, float],
     planes: int,
@@ -103,20 +101,20 @@ def _look(
     """Look through the windows about all seeds, in chunks over threads; each window draws from its own place."""
     rows = np.zeros((len(seeds), 9))
     chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 16)))
-    noises = frame.noise.about(octave.points[seeds], 2.0 * octave.radius)
-    draws = octave.codes[seeds] ^ np.int64(0x2545F491 * (seed + 1))
+    noises = frame.noise.about(scale.points[seeds], 2.0 * scale.radius)
+    draws = scale.codes[seeds] ^ np.int64(0x2545F491 * (seed + 1))
 
     def work(chunk: IndexArray) -> IndexArray:
         counts = np.zeros(len(COUNTS), np.int64)
         if len(chunk):
             part = slice(int(chunk[0]), int(chunk[-1]) + 1)
             _slice_windows(
-                octave.points,
-                octave.cells,
-                octave.starts,
-                octave.side,
+                scale.points,
+                scale.cells,
+                scale.starts,
+                scale.side,
                 seeds[part],
-                2.0 * octave.radius,
+                2.0 * scale.radius,
                 noises[part],
                 draws[part],
                 planes,
@@ -159,7 +157,7 @@ def _slice_windows(
 ) -> None:
     found, around, alone = np.empty(CAPACITY, np.int64), np.empty((3, CAPACITY)), np.empty((3, CAPACITY))
     flat, samples = np.empty((2, CAPACITY)), np.empty((SAMPLES, 5), np.int64)
-    model, normal, frame, shape, quality = np.empty(7), np.empty(3), np.empty((2, 3)), np.empty(5), np.empty(3)
+    model, normal, basis, shape, quality = np.empty(7), np.empty(3), np.empty((2, 3)), np.empty(5), np.empty(3)
     for s in range(len(seeds)):
         seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1
         for _ in range(4):
@@ -180,9 +178,9 @@ def _slice_windows(
                 state = _draw(_fill_normal(state, normal))
                 k = (state >> 20) % n
                 offset = around[0, k] * normal[0] + around[1, k] * normal[1] + around[2, k] * normal[2]
-            fill_frame(normal, frame)
+            fill_basis(normal, basis)
             own = alone if p == 0 else around
-            m = _project(own, size, normal, offset, thick, frame, flat)
+            m = _project(own, size, normal, offset, thick, basis, flat)
             if m < FEWEST:
                 counts[1] += 1
                 continue
@@ -192,7 +190,7 @@ def _slice_windows(
                 continue
             fits = False
             for turn in range(1 if p == 0 else 2):
-                _set_model(normal, offset, frame, shape, 1.0 if turn == 0 else -1.0, model)
+                _set_model(normal, offset, basis, shape, 1.0 if turn == 0 else -1.0, model)
                 low, high = max(radius_range[0], 0.5 * model[6]), min(radius_range[1], 2.0 * model[6])
                 fit = polish(own, size, model, noise, low, high, supported[0], supported[1], 0.5 * low, quality)
                 fits = fits or fit == 2
@@ -282,28 +280,28 @@ def _fill_normal(state: int, normal: FloatArray) -> int:
 
 @njit(cache=True, nogil=True)
 def _project(
-    xyz: FloatArray, n: int, normal: FloatArray, offset: float, thick: float, frame: FloatArray, flat: FloatArray
+    xyz: FloatArray, n: int, normal: FloatArray, offset: float, thick: float, basis: FloatArray, flat: FloatArray
 ) -> int:
     """Fill in the coordinates in the plane of the points close to it; count them."""
     m = 0
     for i in range(n):
         x, y, z = xyz[0, i], xyz[1, i], xyz[2, i]
         if abs(x * normal[0] + y * normal[1] + z * normal[2] - offset) < thick:
-            flat[0, m] = x * frame[0, 0] + y * frame[0, 1] + z * frame[0, 2]
-            flat[1, m] = x * frame[1, 0] + y * frame[1, 1] + z * frame[1, 2]
+            flat[0, m] = x * basis[0, 0] + y * basis[0, 1] + z * basis[0, 2]
+            flat[1, m] = x * basis[1, 0] + y * basis[1, 1] + z * basis[1, 2]
             m += 1
     return m
 
 
 @njit(cache=True, nogil=True)
 def _set_model(
-    normal: FloatArray, offset: float, frame: FloatArray, shape: FloatArray, sign: float, model: FloatArray
+    normal: FloatArray, offset: float, basis: FloatArray, shape: FloatArray, sign: float, model: FloatArray
 ) -> None:
     """Set one of the two cylinders that cut a plane in an ellipse: eq. 3 and 4 of the paper."""
     cosine = shape[3] / shape[2]
     sine = sign * math.sqrt(max(0.0, 1.0 - cosine * cosine))
     along, across = math.cos(shape[4]), math.sin(shape[4])
     for d in range(3):
-        model[d] = shape[0] * frame[0, d] + shape[1] * frame[1, d] + offset * normal[d]
-        model[3 + d] = cosine * normal[d] + sine * (along * frame[0, d] + across * frame[1, d])
+        model[d] = shape[0] * basis[0, d] + shape[1] * basis[1, d] + offset * normal[d]
+        model[3 + d] = cosine * normal[d] + sine * (along * basis[0, d] + across * basis[1, d])
     model[6] = shape[3]

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, Kernel, fit_cylinder
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.cylinder import coordinates_of
-from cylx.records import Finding, Ground, Segment
+from cylx.records import Finding, IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
 
@@ -38,14 +38,14 @@ CLAIMED = 0.5
 Judge = Callable[[Segment, Finding], Finding | None]
 
 
-def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[Finding]:
+def merge_pieces(findings: list[Finding], indexed: IndexedCloud, judge: Judge) -> list[Finding]:
     """Join pairs that one cylinder explains as well as two, until none is left.
 
     Parameters
     ----------
     findings : list of Finding
         Accepted cylinders.
-    ground : Ground
+    indexed : IndexedCloud
         The cloud.
     judge : callable
         Refits and verifies a joined segment, in the light of the better of its parts; None if it does not pass.
@@ -58,7 +58,7 @@ def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[
     pool = sorted(findings, key=lambda finding: -len(finding.points))
     i = 0
     while i < len(pool):
-        joined = _first_join(pool, i, ground, judge)
+        joined = _first_join(pool, i, indexed, judge)
         if joined is None:
             i += 1
         else:
@@ -67,7 +67,7 @@ def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[
     return pool
 
 
-def _first_join(pool: list[Finding], i: int, ground: Ground, judge: Judge) -> tuple[int, Finding] | None:
+def _first_join(pool: list[Finding], i: int, indexed: IndexedCloud, judge: Judge) -> tuple[int, Finding] | None:
     """Give the first after i that can be joined with it, and what they are together."""
     rest = pool[i + 1 :]
     if not rest:
@@ -84,7 +84,7 @@ def _first_join(pool: list[Finding], i: int, ground: Ground, judge: Judge) -> tu
     errors = np.sqrt(pool[i].offset_error ** 2 + offsets**2 + (pool[i].tilt_error * heights) ** 2)
     alike &= apart <= OFFSET * one[6] + 4.0 * errors
     for k in np.flatnonzero(alike):
-        joined = _join(pool[i], rest[k], float(errors[k]), ground, judge)
+        joined = _join(pool[i], rest[k], float(errors[k]), indexed, judge)
         if joined is not None:
             return i + 1 + int(k), joined
     return None
@@ -144,18 +144,18 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
     return square < IN_LINE
 
 
-def _is_bridged(ground: Ground, model: FloatArray, half: float, width: float) -> bool:
+def _is_bridged(indexed: IndexedCloud, model: FloatArray, half: float, width: float) -> bool:
     """Tell whether points lie on a cylinder about its middle, and next to none beside its surface."""
     reach = model[6] + max(0.5 * model[6], 4.0 * width)
-    near = ground.cells.near_cylinder(model, -half, half, 0.0, reach)
-    _, residuals, _ = coordinates_of(ground.points, near[ground.may_be_on(near, model[6])], model)
+    near = indexed.cells.near_cylinder(model, -half, half, 0.0, reach)
+    _, residuals, _ = coordinates_of(indexed.points, near[indexed.may_be_on(near, model[6])], model)
     on = np.abs(residuals) < width
     areas = 4.0 * model[6] * width, reach**2 - 4.0 * model[6] * width
     about = float((~on).sum()) * areas[0] / areas[1]
     return bool(on.sum() >= BETWEEN and on.sum() > DENSER * about)
 
 
-def _join(a: Finding, b: Finding, error: float, ground: Ground, judge: Judge) -> Finding | None:
+def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Judge) -> Finding | None:
     """Fit one cylinder to two pieces alike and in line within an error; None if it does not explain both."""
     one, two = a.segment, b.segment
     across = two.model[:3] - one.model[:3]
@@ -169,10 +169,10 @@ def _join(a: Finding, b: Finding, error: float, ground: Ground, judge: Judge) ->
     low, high = min(-one.half, height - two.half), max(one.half, height + two.half)
     model[:3] += 0.5 * (low + high) * model[3:6]
     half = 0.5 * (high - low)
-    noise = ground.noise_about(one.model, one.half)
-    kernel = Kernel(max(0.1 * model[6], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-    pieces = [ground.points[finding.points[:: 1 + len(finding.points) // ENOUGH]] for finding in (a, b)]
-    fit = fit_cylinder(np.concatenate(pieces), model, low=-1.02 * half, high=1.02 * half, kernel=kernel, steps=30)
+    noise = indexed.noise_about(one.model, one.half)
+    schedule = WeightSchedule(max(0.1 * model[6], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+    pieces = [indexed.points[finding.points[:: 1 + len(finding.points) // ENOUGH]] for finding in (a, b)]
+    fit = fit_cylinder(np.concatenate(pieces), model, low=-1.02 * half, high=1.02 * half, schedule=schedule, steps=30)
     if fit is None:
         return None
     model, spread = fit
@@ -187,6 +187,6 @@ def _join(a: Finding, b: Finding, error: float, ground: Ground, judge: Judge) ->
         if (np.abs(distances - model[6]) < width).mean() < share:
             return None
     lost = far and error > LOST * one.model[6]
-    if lost and not _is_bridged(ground, model, 0.5 * gap - abs(one.half - two.half), 0.5 * width):
+    if lost and not _is_bridged(indexed, model, 0.5 * gap - abs(one.half - two.half), 0.5 * width):
         return None
     return judge(Segment(model, half, spread), a if a.payoff >= b.payoff else b)

@@ -17,7 +17,7 @@ from cylx.evidence.measures import TRUNCATED, distinct_places, lack_of_fit, look
 from cylx.evidence.surroundings import continuation, emptiness, flank
 from cylx.evidence.weights import weigh
 from cylx.geometry.coverage import covered_angle
-from cylx.records import Ground, Segment
+from cylx.records import IndexedCloud, Segment
 
 LEAST = 20
 """Points on the surface without which nothing can be measured."""
@@ -56,7 +56,7 @@ class Verdict:
 
 def verify(
     segment: Segment,
-    ground: Ground,
+    indexed: IndexedCloud,
     payoff: float,
     counts: tuple[int, int],
     config: VerificationConfig,
@@ -67,7 +67,7 @@ def verify(
     ----------
     segment : Segment
         Fitted.
-    ground : Ground
+    indexed : IndexedCloud
         The cloud.
     payoff : float
         Mean payoff of its cluster.
@@ -79,14 +79,14 @@ def verify(
     -------
     Verdict
     """
-    whole = look_at(segment, ground)
+    whole = look_at(segment, indexed)
     points = whole.indices[whole.on]
     shell = whole.thinned(max(1, len(points) // MANY))
     if shell.on.sum() < LEAST:
         return Verdict("too few points", 0.0, {}, 0.0, points)
     coverage = covered_angle(shell.angles[shell.on])
     radius = float(segment.model[6])
-    noise = ground.noise_about(segment.model, segment.half)
+    noise = indexed.noise_about(segment.model, segment.half)
     deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
     shape = shape_of(shell, segment, deviation)
     lack, structure = lack_of_fit(shell, deviation)

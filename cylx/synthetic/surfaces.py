@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 
 FloatArray = NDArray[np.float64]
 
@@ -182,6 +182,6 @@ def random_directions(rng: np.random.Generator, n: int) -> FloatArray:
 def _about_axis(
     point: FloatArray, direction: FloatArray, along: FloatArray, distances: FloatArray, angles: FloatArray
 ) -> FloatArray:
-    first, second = axis_frame(direction)
+    first, second = axis_basis(direction)
     x, y = distances * np.cos(angles), distances * np.sin(angles)
     return np.asarray(point + x[:, None] * first + y[:, None] * second + along[:, None] * direction)

@@ -20,7 +20,7 @@ from tables import Bars, print_header, print_row
 
 from cylx.config import Config
 from cylx.fits.cramer_rao import covariance_bound, mean_length, outlier_information
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.pipeline import extract_cylinders
 from cylx.records import PointCloud
 from cylx.synthetic import single
@@ -78,7 +78,7 @@ def trial(cell, seed):
     if not found or found[0].covariance is None:
         return None
     fit, covariance = found[0].cylinder, found[0].covariance
-    frame = np.array(axis_frame(fit.direction))
+    frame = np.array(axis_basis(fit.direction))
     along = true.direction / (true.direction @ fit.direction)
     away = true.point - fit.point
     error = np.concatenate(

@@ -16,7 +16,7 @@ from single import errors_of
 from tables import Bars, print_header, print_row
 
 from cylx.evaluation import evaluate
-from cylx.fits.robust import Kernel, fit_cylinder
+from cylx.fits.robust import WeightSchedule, fit_cylinder
 from cylx.geometry.cylinder import Cylinder
 from cylx.io import read_cloud
 
@@ -33,7 +33,9 @@ def least_squares(true, points):
     """Fit a cylinder to its points, from the truth."""
     start = np.array([*true.point, *true.direction, true.radius])
     wide = WIDE * true.radius
-    fit = fit_cylinder(points, start, low=-np.inf, high=np.inf, kernel=Kernel(wide, wide, 1.0, np.inf), steps=50)
+    fit = fit_cylinder(
+        points, start, low=-np.inf, high=np.inf, schedule=WeightSchedule(wide, wide, 1.0, np.inf), steps=50
+    )
     return Cylinder(fit[0][:3], fit[0][3:6], fit[0][6], true.height)
 
 

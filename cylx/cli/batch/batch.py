@@ -18,14 +18,14 @@ from cylx.cli.batch.outcomes import Finished, Outcome, check_required, entry_of,
 from cylx.cli.batch.resume import check_own, finished_before, is_own_json
 from cylx.cli.batch.run import attempt
 from cylx.cli.batch.summary import LIST, is_own_table, list_text, table_text
-from cylx.cli.terminal.display import Conversation, show_table
+from cylx.cli.terminal.display import Messages, show_table
 from cylx.cli.terminal.failures import DEBUG, tell
 from cylx.cli.terminal.stopwatch import peak_memory
 from cylx.errors import BatchError, NothingFoundError, OutputError
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
-    from cylx.cli.batch.many import Many
+    from cylx.cli.batch.options import BatchOptions
     from cylx.cli.batch.run import Run
 
 SHORT = 20
@@ -41,16 +41,16 @@ class Batch:
         How one is done.
     jobs : list of Job
         The scans.
-    many : Many
+    options : BatchOptions
         How they are done together.
     summaries : list of str
         The table and the list to write, or nothing.
     """
 
-    def __init__(self, run: Run, jobs: list[Job], many: Many, summaries: list[str]) -> None:
+    def __init__(self, run: Run, jobs: list[Job], options: BatchOptions, summaries: list[str]) -> None:
         self.run = run
         self.jobs = jobs
-        self.many = many
+        self.options = options
         self.summaries = summaries
         self.outcomes: dict[int, Outcome] = {}
 
@@ -64,11 +64,11 @@ class Batch:
         """
         from cylx.io import check_writable, printable
 
-        if self.many.resume and not overwrite:
+        if self.options.resume and not overwrite:
             check_own(self.jobs)
         for name in self.summaries:
             old = Path(name).is_file()
-            if old and not overwrite and not (self.many.resume and self._is_summary(name)):
+            if old and not overwrite and not (self.options.resume and self._is_summary(name)):
                 remedy = "give --resume, --overwrite or --no-summary, or another folder"
                 raise OutputError(printable(name), "exists already", remedy)
             check_writable(name, overwrite=True)
@@ -87,7 +87,7 @@ class Batch:
             self._do_only(self.jobs[0])
             return
         started = perf_counter()
-        with self.run.talk.counting(len(self.jobs)) as advance:
+        with self.run.messages.counting(len(self.jobs)) as advance:
             for index, outcome in self._outcomes():
                 self.outcomes[index] = outcome
                 self._show(self.jobs[index], outcome)
@@ -117,7 +117,7 @@ class Batch:
             finished = self.run.extract_one(job) if before is None else before
             self.outcomes[0] = Outcome("done", finished, peak=peak_memory())
             if before is not None:
-                self.run.talk.say(f"{found_line(job, finished.cylinders)} before")
+                self.run.messages.say(f"{found_line(job, finished.cylinders)} before")
             check_required(job, finished.cylinders, self.run.require)
         except Exception as failure:
             known = self.outcomes.get(0)
@@ -129,7 +129,7 @@ class Batch:
     def _outcomes(self) -> Generator[tuple[int, Outcome], None, None]:
         """Give what became of each scan, by its place in the list: first those that were done before."""
         todo = []
-        if self.many.resume:
+        if self.options.resume:
             self._tidy()
         for index, job in enumerate(self.jobs):
             finished = self._finished_before(job)
@@ -138,14 +138,14 @@ class Batch:
             else:
                 yield index, self._skipped(job, finished)
         jobs = [self.jobs[index] for index in todo]
-        processes = self.many.processes([job.scan for job in jobs])
+        processes = self.options.processes([job.scan for job in jobs])
         answers = self._here(jobs) if processes is None else self._elsewhere(jobs, processes)
         with closing(answers):
             for place, outcome in answers:
                 yield todo[place], outcome
 
     def _finished_before(self, job: Job) -> Finished | None:
-        result = finished_before(job, self.run.settings, self.run.selection) if self.many.resume else None
+        result = finished_before(job, self.run.settings, self.run.selection) if self.options.resume else None
         return None if result is None else Finished(result.input.points, len(result.cylinders), result.warnings)
 
     def _here(self, jobs: Sequence[Job]) -> Generator[tuple[int, Outcome], None, None]:
@@ -166,7 +166,7 @@ class Batch:
                 yield place, lost_outcome(jobs[place], answer.exit_code) if isinstance(answer, Lost) else answer
 
     def _silent(self) -> Run:
-        return replace(self.run, talk=Conversation(quiet=True))
+        return replace(self.run, messages=Messages(quiet=True))
 
     def _skipped(self, job: Job, finished: Finished) -> Outcome:
         try:
@@ -183,17 +183,17 @@ class Batch:
             tell(outcome.trace)
         if outcome.status == "failed":
             tell(f"cylx: {outcome.reason}")
-        if outcome.finished is None or (len(self.jobs) >= SHORT and not self.run.talk.verbose):
+        if outcome.finished is None or (len(self.jobs) >= SHORT and not self.run.messages.verbose):
             return
         if outcome.status == "skipped":
-            self.run.talk.say(f"{found_line(job, outcome.finished.cylinders)} before")
+            self.run.messages.say(f"{found_line(job, outcome.finished.cylinders)} before")
         else:
-            self.run.talk.say(found_line(job, outcome.finished.cylinders))
+            self.run.messages.say(found_line(job, outcome.finished.cylinders))
             for warning in outcome.finished.warnings:
-                self.run.talk.say(f"warning: {printable(job.scan)}: {warning}")
+                self.run.messages.say(f"warning: {printable(job.scan)}: {warning}")
 
     def _show_counts(self, failed: int, seconds: float) -> None:
-        if self.run.talk.quiet:
+        if self.run.messages.quiet:
             return
         statuses = [outcome.status for outcome in self.outcomes.values()]
         found = sum(outcome.finished.cylinders for outcome in self.outcomes.values() if outcome.finished is not None)

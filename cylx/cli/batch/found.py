@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from cylx.cli.terminal.display import Conversation, show_table
+from cylx.cli.terminal.display import Messages, show_table
 from cylx.cli.terminal.failures import tell
 
 if TYPE_CHECKING:
@@ -15,20 +15,20 @@ _MOST_ROWS = 20
 _CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "confidence", "direction"]
 
 
-def report(talk: Conversation, job: Job, extraction: Extraction) -> None:
+def report(messages: Messages, job: Job, extraction: Extraction) -> None:
     """Say what was found in a scan and where it was written."""
-    if talk.quiet:
+    if messages.quiet:
         return
     fits = extraction.cylinders
     tell(found_line(job, len(fits)))
     for warning in extraction.warnings:
         tell(f"warning: {warning}")
-    if talk.verbose:
+    if messages.verbose:
         scene = extraction.scene
         tell(f"spacing {scene.spacing:.4g}, noise {scene.noise:.4g}, extent {scene.extent:.4g}")
         show_table(["stage", "considered", "kept", "rejected"], _stage_rows(extraction), err=True)
     if fits:
-        shown = fits if talk.verbose else fits[:_MOST_ROWS]
+        shown = fits if messages.verbose else fits[:_MOST_ROWS]
         header, rows = _CYLINDER_HEADER, [_cylinder_row(i, fit) for i, fit in enumerate(shown)]
         if extraction.config.scene.catalogue:
             header, rows = [*header, "nominal"], [[*row, _nominal(f)] for row, f in zip(rows, shown, strict=True)]

@@ -10,7 +10,7 @@ from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_ou
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
 
 if TYPE_CHECKING:
-    from cylx.cli.terminal.display import Conversation
+    from cylx.cli.terminal.display import Messages
     from cylx.config import Config
     from cylx.records import Selection
 
@@ -29,7 +29,7 @@ class Run:
         Fewest cylinders in each scan.
     overwrite : bool
         Whether files that exist may be replaced.
-    talk : Conversation
+    messages : Messages
         What is shown.
     selection : Selection
         Which points take part.
@@ -39,7 +39,7 @@ class Run:
     threads: int | None
     require: int | None
     overwrite: bool
-    talk: Conversation
+    messages: Messages
     selection: Selection
 
     def extract_one(self, job: Job) -> Finished:
@@ -63,7 +63,7 @@ class Run:
         from cylx.scene import select
 
         stopwatch = Stopwatch(job.scan)
-        with self.talk.progress() as display:
+        with self.messages.progress() as display:
             observer = Observers(display, stopwatch)
             with observed(observer, "reading"):
                 cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
@@ -73,9 +73,9 @@ class Run:
                 remarks = write_job(job, extraction, overwrite=self.overwrite)
         found = len(extraction.cylinders)
         profile = stopwatch.report(cloud.rows, found)
-        report(self.talk, job, extraction)
+        report(self.messages, job, extraction)
         for remark in remarks:
-            self.talk.say(f"warning: {remark}")
+            self.messages.say(f"warning: {remark}")
         return Finished(cloud.rows, found, extraction.warnings, profile)
 
 

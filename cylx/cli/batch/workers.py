@@ -50,14 +50,14 @@ class Workers(Generic[Task, Answer]):
         What is done with each task, in a process; it is pickled.
     most : int
         Number of processes.
-    bury : callable
+    after_death : callable
         Is told the id of each process that died or had to be killed.
     """
 
-    def __init__(self, work: Callable[[Task], Answer], most: int, bury: Callable[[int], None]) -> None:
+    def __init__(self, work: Callable[[Task], Answer], most: int, after_death: Callable[[int], None]) -> None:
         self.work = work
         self.most = most
-        self.bury = bury
+        self.after_death = after_death
         self._idle: list[_Worker] = []
         self._busy: dict[int, _Worker] = {}
 
@@ -138,7 +138,7 @@ class Workers(Generic[Task, Answer]):
             worker.process.kill()
             worker.process.join()
         if worker.process.exitcode:
-            self.bury(worker.pid)
+            self.after_death(worker.pid)
 
 
 class _Worker:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.batch.many import AUTO, Many
+from cylx.cli.batch.options import AUTO, BatchOptions
 from cylx.cli.options.configuration import Command, complete_files
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ class Processes(NumberType):
         return number
 
 
-def with_many(command: Command) -> Command:
-    """Add the options about many scans; the command gets `many`."""
+def with_batch_options(command: Command) -> Command:
+    """Add the options about many scans; the command gets `options`."""
 
     @functools.wraps(command)
     def with_options(
@@ -48,7 +48,7 @@ def with_many(command: Command) -> Command:
         summary: bool | None,
         **others: object,
     ) -> object:
-        return command(*args, many=Many(out_dir, recursive, jobs, resume, summary), **others)
+        return command(*args, options=BatchOptions(out_dir, recursive, jobs, resume, summary), **others)
 
     for option in reversed(_OPTIONS):
         with_options = option(with_options)

@@ -3,7 +3,7 @@
 | function | options | the command gets |
 |---|---|---|
 | `configured` | `-c/--config --method --preset --set --seed`, and limits: `--radius` … | `settings`, a `Config` |
-| `talking` | `-q/--quiet -v/--verbose` | `talk`, a `Conversation` |
+| `talking` | `-q/--quiet -v/--verbose` | `messages`, a `Messages` |
 | `overwrite_option` | `--overwrite` | `overwrite`, a bool |
 | `json_option` | `--json` | `as_json`, a bool |
 | `debug_option` | `--debug` | nothing |
@@ -242,13 +242,13 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
 
 
 def talking(command: Command) -> Command:
-    """Add `-q` and `-v`; the command gets `talk`."""
+    """Add `-q` and `-v`; the command gets `messages`."""
 
     @functools.wraps(command)
     def with_talk(*args: object, quiet: bool, verbose: bool, **others: object) -> object:
-        from cylx.cli.terminal.display import Conversation
+        from cylx.cli.terminal.display import Messages
 
-        return command(*args, talk=Conversation(quiet=quiet, verbose=verbose and not quiet), **others)
+        return command(*args, messages=Messages(quiet=quiet, verbose=verbose and not quiet), **others)
 
     verbose = click.option("-v", "--verbose", is_flag=True, help="Say what each stage kept and dropped, and why.")
     quiet = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")

@@ -19,7 +19,7 @@ _NARROWEST, _WIDE_ENOUGH = 80, 200
 _COMPILING = "compiling (the first time only)"
 
 
-class Conversation:
+class Messages:
     """All that a command says on standard error, apart from errors.
 
     Parameters

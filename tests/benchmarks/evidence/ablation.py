@@ -18,7 +18,7 @@ sys.path.append(str(Path(__file__).parents[1]))
 from tables import print_header, print_row
 
 from cylx.evaluation import evaluate
-from cylx.evidence import weights as evidence
+from cylx.evidence import weights as evidence_weights
 
 HELD_OUT = range(10000, 10003)
 POINTS = 80000
@@ -27,17 +27,17 @@ POINTS = 80000
 @contextmanager
 def weighed_by(law):
     """Let `cylx.evidence` weigh the terms that a law has, by its weights, for a while."""
-    before = evidence.BIAS, evidence.TERMS
+    before = evidence_weights.BIAS, evidence_weights.TERMS
     weights = law["weights"]
-    kept = [term._replace(weight=weights[term.reason]) for term in evidence.TERMS if term.reason in weights]
+    kept = [term._replace(weight=weights[term.reason]) for term in evidence_weights.TERMS if term.reason in weights]
     if len(kept) < len(weights):
         unknown = set(weights) - {term.reason for term in kept}
         raise SystemExit(f"cylx.evidence has no term {', '.join(sorted(unknown))}; run fit.py --ablation again")
-    evidence.BIAS, evidence.TERMS = law["bias"], tuple(kept)
+    evidence_weights.BIAS, evidence_weights.TERMS = law["bias"], tuple(kept)
     try:
         yield
     finally:
-        evidence.BIAS, evidence.TERMS = before
+        evidence_weights.BIAS, evidence_weights.TERMS = before
 
 
 def counts_of(scenes):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cylx.geometry.cylinder import Cylinder, axis_frame, cylinder_coordinates
+from cylx.geometry.cylinder import Cylinder, axis_basis, cylinder_coordinates
 from cylx.synthetic.surfaces import Box, Mantle, Sphere, Wall, random_directions
 
 
@@ -298,7 +298,7 @@ def _feet(points, shape: Cylinder):
 
 
 def _turned_about(direction, along, distances, angles):
-    first, second = axis_frame(direction)
+    first, second = axis_basis(direction)
     x, y = distances * np.cos(angles), distances * np.sin(angles)
     return x[:, None] * first + y[:, None] * second + along[:, None] * direction
 

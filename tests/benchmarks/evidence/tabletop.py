@@ -5,7 +5,7 @@ from drafts import Sketch, finish
 from solids import Elbow, Ellipsoid, Horn, Lathe, RoundedBox, lid, random_dents, random_turn
 from visibility import scanned
 
-from cylx.geometry.cylinder import Cylinder, axis_frame
+from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.synthetic.surfaces import Box, Mantle, Sphere, Wall
 
 TABLE = np.array([1.2, 0.8, 0.0])  # metres
@@ -76,7 +76,7 @@ def can(rng, sketch, taken):
     real = rng.random() < 0.7
     sketch.add_cylinder(shape, formed(rng, foot, direction, radius, height) if real else Mantle(shape, 0.0, 2 * np.pi))
     if is_mug:
-        first, second = axis_frame(direction)
+        first, second = axis_basis(direction)
         angle = rng.uniform(0, 2 * np.pi)
         out = np.cos(angle) * first + np.sin(angle) * second
         turn = np.column_stack([-direction, out, np.cross(-direction, out)])
@@ -87,7 +87,7 @@ def can(rng, sketch, taken):
         sketch.add(lid(inner, -1), lid(inner, 1))
         if real and rng.random() < 0.5:  # rolled rims
             bead = rng.uniform(0.0007, 0.0025)
-            turn = np.column_stack([*axis_frame(direction), direction])
+            turn = np.column_stack([*axis_basis(direction), direction])
             sketch.add(*(Elbow(end, turn, bead, radius, 2 * np.pi) for end in (shape.start, shape.end)))
 
 

@@ -16,7 +16,7 @@ from cylx.errors import OutputError, UsageError
 AUTO = 0
 
 
-class Many(NamedTuple):
+class BatchOptions(NamedTuple):
     """What was asked for with many scans in mind.
 
     Parameters
