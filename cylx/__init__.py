@@ -5,6 +5,7 @@ The public names are resolved when they are first used, so that `import cylx` an
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from cylx.records import CylinderFit as CylinderFit
     from cylx.records import Extraction as Extraction
     from cylx.records import PointCloud as PointCloud
-    from cylx.records import RejectedCylinder as RejectedCylinder
+    from cylx.records import RejectedFit as RejectedFit
     from cylx.report import plot_radii as plot_radii
     from cylx.report import plot_residuals as plot_residuals
     from cylx.report import plot_scene as plot_scene
@@ -42,7 +43,7 @@ _HOMES = {
     "CylxError": "cylx.errors",
     "Extraction": "cylx.records",
     "PointCloud": "cylx.records",
-    "RejectedCylinder": "cylx.records",
+    "RejectedFit": "cylx.records",
     "Result": "cylx.results",
     "compare": "cylx.evaluation",
     "evaluate": "cylx.evaluation",
@@ -70,6 +71,11 @@ follow_old_names()
 
 
 def __getattr__(name: str) -> object:
+    if name == "Rejection":
+        warnings.warn(
+            "cylx.Rejection is RejectedFit now; it goes with the next release", DeprecationWarning, stacklevel=2
+        )
+        name = "RejectedFit"
     if name not in _HOMES:
         raise AttributeError(f"module 'cylx' has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

@@ -75,7 +75,7 @@ def make_extraction():
     """Make an extraction of a cloud by hand: cylinders of radius 1, 2, … on the z axis, all points on the first."""
     from cylx.config import Config
     from cylx.geometry.cylinder import Cylinder
-    from cylx.records import CylinderFit, Extraction, PointCloud, RejectedCylinder, Scene, StageReport
+    from cylx.records import CylinderFit, Extraction, PointCloud, RejectedFit, Scene, StageReport
 
     def make(cloud=None, config=None, *, cylinders=2, rejected=1):
         cloud = PointCloud(POINTS) if cloud is None else cloud
@@ -94,7 +94,7 @@ def make_extraction():
             stages=(StageReport("slicing", 40, 38, {"too few points": 2}),),
             config=config or Config(),
             warnings=("made by hand",),
-            rejected=(RejectedCylinder(refused, "agreement"),) * rejected,
+            rejected=(RejectedFit(refused, "agreement"),) * rejected,
         )
 
     return make

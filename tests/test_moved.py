@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from cylx.geometry.cylinder import axis_basis, axis_frame
 from cylx.moved import MOVED, follow_old_names
 
 CHANGES = (Path(__file__).resolve().parents[1] / "CHANGELOG.md").read_text(encoding="utf-8")
@@ -38,3 +39,25 @@ def test_old_names_are_followed_once():
     before = list(sys.meta_path)
     follow_old_names()
     assert sys.meta_path == before
+
+
+@pytest.mark.parametrize(
+    ("module", "old", "new"),
+    [
+        ("cylx", "Rejection", "RejectedFit"),
+        ("cylx.records", "Rejection", "RejectedFit"),
+    ],
+)
+def test_an_old_name_of_a_class_leads_to_the_new_one_and_warns(module, old, new):
+    home = import_module(module)
+    with pytest.warns(DeprecationWarning, match=f"{old} is {new} now"):
+        assert getattr(home, old) is getattr(home, new)
+    assert f"`{old}`" in CHANGES
+
+
+def test_the_old_name_of_the_basis_about_an_axis_warns():
+    with pytest.warns(DeprecationWarning, match="axis_frame is axis_basis now"):
+        first, second = axis_frame((0.0, 0.0, 1.0))
+    assert (first == axis_basis((0.0, 0.0, 1.0))[0]).all()
+    assert (second == axis_basis((0.0, 0.0, 1.0))[1]).all()
+    assert "`axis_frame`" in CHANGES

@@ -29,8 +29,8 @@ POLISH_STEPS = 10
 SOME, LAST_STEPS = 150, 3
 """Points that suffice for the first steps of a polish, and steps with all of them."""
 SHARP = 0.34
-"""Largest spread of a polished candidate over its kernel: a Gaussian within it has 0.27 of the width, a uniform
-background 0.378."""
+"""Largest spread of a polished candidate over the width of its weights: a Gaussian within it has 0.27 of the width, a
+uniform background 0.378."""
 
 
 class WeightSchedule(NamedTuple):
@@ -146,8 +146,8 @@ def fit_in_place(
 ) -> float:
     """Fit `model` = (point, direction, radius), shape (7,), to xyz[:, :n] whose height lies in [low, high].
 
-    Heights are measured from the model's point along its direction. `schedule` (6,) has what a `WeightSchedule` has, and the
-    most steps. `normal` (5, 5), `right` (5,) and `frame` (2, 3) are scratch.
+    Heights are measured from the model's point along its direction. `schedule` (6,) has what a `WeightSchedule` has,
+    and the most steps. `normal` (5, 5), `right` (5,) and `basis` (2, 3) are scratch.
 
     Returns
     -------

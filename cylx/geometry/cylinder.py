@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -138,6 +139,12 @@ def axis_basis(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
     first = cross(direction, helper)
     first /= np.linalg.norm(first)
     return first, cross(direction, first)
+
+
+def axis_frame(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return what `axis_basis` does; the old name of it."""
+    warnings.warn("axis_frame is axis_basis now; it goes with the next release", DeprecationWarning, stacklevel=2)
+    return axis_basis(direction)
 
 
 def surface_distances(points: FloatArray, cylinder: Cylinder) -> FloatArray:

@@ -108,7 +108,7 @@ def symmetric_eigen(matrix: FloatArray, vectors: FloatArray) -> None:
 
 @njit(cache=True, nogil=True)
 def fill_basis(direction: FloatArray, basis: FloatArray) -> None:
-    """Fill the rows of `frame` (2, 3) with unit vectors that make a right-handed basis with a unit direction (3,)."""
+    """Fill the rows of `basis` (2, 3) with unit vectors that make a right-handed basis with a unit direction (3,)."""
     x, y, z = direction[0], direction[1], direction[2]
     if abs(x) <= abs(y) and abs(x) <= abs(z):
         a, b, c = 0.0, z, -y

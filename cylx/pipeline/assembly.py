@@ -16,7 +16,7 @@ from cylx.records import (
     IndexedCloud,
     NominalRadius,
     PointCloud,
-    RejectedCylinder,
+    RejectedFit,
     RejectedSegment,
     Scene,
     StageReport,
@@ -110,7 +110,7 @@ def _nominal(finding: Finding, config: Config, spacing: float) -> NominalRadius 
 
 def _rejections(
     refused: list[RejectedSegment], frame: Frame, indexed: IndexedCloud, *, verified: bool, game: bool
-) -> list[RejectedCylinder]:
+) -> list[RejectedFit]:
     """Put what was refused into scene units, the most trusted first; what has no shape at all is left out."""
     out = []
     for rejected_segment in refused:
@@ -128,7 +128,7 @@ def _rejections(
             rejected_segment.confidence if verified else None,
             rejected_segment.measures,
         )
-        out.append(RejectedCylinder(fit, rejected_segment.reason))
+        out.append(RejectedFit(fit, rejected_segment.reason))
     return sorted(out, key=lambda one: (one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers))
 
 

@@ -4,6 +4,10 @@ Many things of one kind travel as a structure of arrays (`Candidates`); the few 
 one. All records are frozen: a stage makes new ones and never changes those it was given.
 """
 
+from __future__ import annotations
+
+import warnings
+
 from cylx.records.candidates import Candidates, Cluster, EllipseFit, Slice
 from cylx.records.clouds import Frame, IndexedCloud, Noise, PointCloud, Scene, cell_keys
 from cylx.records.cylinders import (
@@ -11,7 +15,7 @@ from cylx.records.cylinders import (
     Extraction,
     Finding,
     NominalRadius,
-    RejectedCylinder,
+    RejectedFit,
     RejectedSegment,
     Segment,
 )
@@ -35,7 +39,7 @@ __all__ = [
     "NominalRadius",
     "Observer",
     "PointCloud",
-    "RejectedCylinder",
+    "RejectedFit",
     "RejectedSegment",
     "Scale",
     "Scene",
@@ -47,3 +51,12 @@ __all__ = [
     "StageReport",
     "cell_keys",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name != "Rejection":
+        raise AttributeError(f"module 'cylx.records' has no attribute {name!r}")
+    warnings.warn(
+        "cylx.records.Rejection is RejectedFit now; it goes with the next release", DeprecationWarning, stacklevel=2
+    )
+    return RejectedFit

@@ -36,7 +36,7 @@ class Segment:
     spread : float
         Robust standard deviation of its residuals; 0 if it was not fitted.
     covariance : ndarray of shape (5, 5), optional
-        Of two offsets of the axis, its two tilts and the radius, in the frame of `fill_basis`; None before the last
+        Of two offsets of the axis, its two tilts and the radius, in the basis of `fill_basis`; None before the last
         fit.
     choice : Choice, optional
         The entry of a catalogue that was chosen for the radius; None before the last fit, and without a catalogue.
@@ -203,7 +203,7 @@ class CylinderFit:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RejectedCylinder:
+class RejectedFit:
     """What was taken for a cylinder and not accepted.
 
     Parameters
@@ -242,7 +242,7 @@ class Extraction:
         The resolved configuration: nothing in it is None that the run depended on.
     warnings : tuple of str
         What a user should know before trusting the answer.
-    rejected : tuple of RejectedCylinder
+    rejected : tuple of RejectedFit
         What was not accepted, ordered by confidence, then inliers, descending; what was not measured comes last. The
         like of one refused segment may be in it more than once.
     """
@@ -255,7 +255,7 @@ class Extraction:
     stages: tuple[StageReport, ...]
     config: Config
     warnings: tuple[str, ...] = ()
-    rejected: tuple[RejectedCylinder, ...] = ()
+    rejected: tuple[RejectedFit, ...] = ()
 
     def __repr__(self) -> str:
         count = len(self.cylinders)

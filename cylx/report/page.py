@@ -41,8 +41,8 @@ def page_of(page_data: dict[str, Any]) -> str:
     Parameters
     ----------
     page_data : dict
-        A JSON object, as `page_data_of` gives it. With `embedded` it has neither `config`, `fields` nor `rejected`, and the
-        page is the view and the details alone, for a frame in another page.
+        A JSON object, as `page_data_of` gives it. With `embedded` it has neither `config`, `fields` nor `rejected`, and
+        the page is the view and the details alone, for a frame in another page.
 
     Returns
     -------

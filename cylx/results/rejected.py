@@ -14,7 +14,7 @@ from cylx.results.result import Measured
 from cylx.version import __version__
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, RejectedCylinder
+    from cylx.records import Extraction, RejectedFit
 
 
 class Reasoned(Part):
@@ -28,9 +28,9 @@ class RejectedCylinder(Measured, Reasoned):  # the keys of the last one come fir
     """A shape that was taken for a cylinder, why it was not accepted, and what was measured of it until then."""
 
     @classmethod
-    def of(cls, rejection: RejectedCylinder) -> RejectedCylinder:
+    def of(cls, rejected: RejectedFit) -> RejectedCylinder:
         """Write down what was not accepted."""
-        return cls(reason=rejection.reason, **cls.keys_of(rejection.fit))
+        return cls(reason=rejected.reason, **cls.keys_of(rejected.fit))
 
 
 class Rejections(Part):
@@ -62,7 +62,7 @@ class Rejections(Part):
             cylx_version=__version__,
             input=Input.of(extraction),
             config=extraction.config.model_dump(mode="json"),
-            rejected=[RejectedCylinder.of(rejection) for rejection in extraction.rejected],
+            rejected=[RejectedCylinder.of(one) for one in extraction.rejected],
         )
 
     def to_object(self) -> dict[str, Any]:
