@@ -6,7 +6,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from cylx.fits.nominal_radius import DECISIVE, MOST, NEAR, Catalogue, choose_entry
+from cylx.fits.nominal_radius import DECISIVE, MOST_RATIO, NEAR_IN_DEVIATIONS, Catalogue, choose_entry
 
 lengths = st.floats(1e-6, 1e6)
 shares = st.floats(1e-6, 0.5)
@@ -50,13 +50,13 @@ def test_a_table_of_decisions(radius, deviation, radii, tolerances, decision, en
 @given(lengths, shares, catalogues())
 def test_the_ratio_is_finite_and_the_decision_follows_from_it(radius, share, catalogue):
     choice = choose_entry(radius, share * radius, catalogue)
-    assert 1 / MOST * (1 - 1e-9) <= choice.ratio <= MOST * (1 + 1e-9)
+    assert 1 / MOST_RATIO * (1 - 1e-9) <= choice.ratio <= MOST_RATIO * (1 + 1e-9)
     spread = math.hypot(share * radius, catalogue.tolerances[choice.entry])
     away = abs(radius - catalogue.radii[choice.entry]) / spread
     if choice.decision == "snapped":
         assert choice.ratio >= DECISIVE * (1 - 1e-9)
-        assert away <= NEAR
-    elif away <= NEAR:
+        assert away <= NEAR_IN_DEVIATIONS
+    elif away <= NEAR_IN_DEVIATIONS:
         assert choice.ratio < DECISIVE * (1 + 1e-9)
 
 

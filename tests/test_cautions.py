@@ -9,7 +9,7 @@ from cylx.api import extract
 from cylx.io import read_cloud
 from cylx.records import PointCloud, Scene
 from cylx.scene import measure_scene
-from cylx.scene.cautions import SAMPLE, cautions, damage, step_of
+from cylx.scene.cautions import COORDINATES_SAMPLED, cautions, damage, step_of
 from cylx.synthetic import multi, single
 
 SAMPLES = Path(__file__).resolve().parents[1] / "sample_data"
@@ -58,7 +58,10 @@ def bad_clouds(pipes):
         "single precision": ((pipes + 1e5).astype(np.float32), {"precision"}),
         "single precision that leaves nothing": ((pipes + 5e6).astype(np.float32), {"precision"}),
         "all points twice": (np.vstack([pipes, pipes]), {"copies"}),
-        "a cloud too large to look at whole": (np.repeat(random(SAMPLE, 3), 3, axis=0), {"copies", "noise"}),
+        "a cloud too large to look at whole": (
+            np.repeat(random(COORDINATES_SAMPLED, 3), 3, axis=0),
+            {"copies", "noise"},
+        ),
         "noise above the spacing": (PIPES + 10 * NOISE * random(*PIPES.shape), {"noise"}),
         "half of the rows without a place": (np.vstack([pipes, np.full((len(pipes) + 1, 3), np.nan)]), {"missing"}),
         "few points": (single(points=39).points, {"few"}),

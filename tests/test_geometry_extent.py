@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cylx.geometry.cylinder import coordinates_of, points_on
-from cylx.geometry.extent import LEAST, visible_extent
+from cylx.geometry.extent import LEAST_POINTS_OF_EXTENT, visible_extent
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=50, deadline=None)
@@ -105,7 +105,7 @@ def test_what_goes_on_at_one_side_of_the_arc_alone_is_something_else(seed):
     assert np.allclose(ends, (-2, 2), rtol=0, atol=0.35)
 
 
-@pytest.mark.parametrize("n", [0, 1, LEAST - 1])
+@pytest.mark.parametrize("n", [0, 1, LEAST_POINTS_OF_EXTENT - 1])
 def test_a_handful_of_points_has_no_extent(n):
     heights, angles = surface(np.random.default_rng(0), n, 2 * np.pi, -1, 1)
     assert visible_extent(heights, angles, 1.0, 1.0) is None

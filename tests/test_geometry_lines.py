@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.geometry.lines import LEAST, PARALLEL, common_perpendicular, fit_line, off_line
+from cylx.geometry.lines import LEAST_POINTS_OF_LINE, PARALLEL, common_perpendicular, fit_line, off_line
 
 seeds = st.integers(0, 2**32 - 1)
 angles = st.floats(-7, np.log10(1.57)).map(
@@ -223,7 +223,7 @@ def test_the_place_is_on_the_line_and_the_distances_are_root_mean_squares(seed):
 def test_only_the_first_points_count_and_of_a_few_there_is_no_line():
     rng = np.random.default_rng(0)
     xyz = np.ascontiguousarray(rod(rng, 60, 2.0, 0.01)[0].T)
-    for n in range(LEAST):
+    for n in range(LEAST_POINTS_OF_LINE):
         assert fit_line(xyz, n, np.inf, np.zeros(3), np.empty(3)) == (np.inf, 1.0)
     one, other = (np.zeros(3), np.empty(3)), (np.zeros(3), np.empty(3))
     assert fit_line(xyz, 40, np.inf, *one) == fit_line(xyz[:, :40].copy(), 40, np.inf, *other)

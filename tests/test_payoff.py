@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cylx.game import local_payoff, screw_payoff
-from cylx.game.payoff import CUT, REACH
+from cylx.game.payoff import CUT, REACH_IN_RADII
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
 
 seeds = st.integers(0, 2**32 - 1)
@@ -110,7 +110,7 @@ def brute_force(models, parents, extents, angle, offset, radius, min_ratio):
             p, q, r, s = models[i, :3], models[j, :3], models[i, 6], models[j, 6]
             u, v = models[i, 3:6], models[j, 3:6]
             ratio, mean = min(r, s) / max(r, s), 0.5 * (r + s)
-            reach = max(REACH * mean, extents[i], extents[j])
+            reach = max(REACH_IN_RADII * mean, extents[i], extents[j])
             if parents[i] == parents[j] or ratio < min_ratio or np.linalg.norm(q - p) > reach:
                 continue
             turn = np.arctan2(np.linalg.norm(np.cross(u, v)), abs(u @ v))

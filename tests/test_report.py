@@ -24,7 +24,15 @@ from cylx.report.maps import EMPTY, unroll
 from cylx.report.page import json_for_script
 from cylx.report.page_data import page_data_of
 from cylx.report.picture import outline
-from cylx.report.points import LEAST, STEPS, choose_points, original_colors, pack_labels, pack_residuals, quantise
+from cylx.report.points import (
+    LEAST_OF_EACH_CYLINDER,
+    STEPS_ACROSS_BOX,
+    choose_points,
+    original_colors,
+    pack_labels,
+    pack_residuals,
+    quantise,
+)
 from cylx.results import Result
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&lt;\u2028\"'{{script}}.ply"
@@ -82,9 +90,9 @@ def test_the_object_in_the_page_agrees_with_the_result(extraction):
 def test_the_points_in_the_page_are_those_of_the_cloud(extraction):
     view = page_data_of(extraction)["view"]
     steps = unpacked(view["points"], "<u2").reshape(-1, 3)
-    points = np.array(view["low"]) + steps / STEPS * np.array(view["size"])
+    points = np.array(view["low"]) + steps / STEPS_ACROSS_BOX * np.array(view["size"])
     expected = extraction.cloud.points[np.lexsort(extraction.cloud.points.T)]
-    assert points[np.lexsort(np.round(points, 4).T)] == pytest.approx(expected, abs=4.0 / STEPS)
+    assert points[np.lexsort(np.round(points, 4).T)] == pytest.approx(expected, abs=4.0 / STEPS_ACROSS_BOX)
     assert set(unpacked(view["labels"], "u1")) == {0}
     assert set(unpacked(view["residuals"], "i1")) == {0}
 
@@ -112,14 +120,14 @@ def test_the_same_result_gives_the_same_bytes(make_extraction):
 def test_coordinates_are_off_by_half_a_step_at_most():
     points = np.random.default_rng(3).normal(size=(5000, 3)) * [100, 1, 1e-3] + [4e6, -5e5, 0]
     steps, low, size = quantise(points)
-    assert (steps.dtype, steps.min(), steps.max()) == (np.dtype("<u2"), 0, STEPS)
-    assert (np.abs(low + steps / STEPS * size - points) <= size / STEPS * 0.5001 + 1e-9).all()
+    assert (steps.dtype, steps.min(), steps.max()) == (np.dtype("<u2"), 0, STEPS_ACROSS_BOX)
+    assert (np.abs(low + steps / STEPS_ACROSS_BOX * size - points) <= size / STEPS_ACROSS_BOX * 0.5001 + 1e-9).all()
 
 
 def test_a_flat_cloud_has_a_box_without_thickness():
     steps, _, size = quantise(np.array([[0.0, 1, 2], [1, 1, 2]]))
     assert size.tolist() == [1, 0, 0]
-    assert steps.tolist() == [[0, 0, 0], [STEPS, 0, 0]]
+    assert steps.tolist() == [[0, 0, 0], [STEPS_ACROSS_BOX, 0, 0]]
 
 
 def test_few_points_are_all_shown():
@@ -134,7 +142,7 @@ def test_many_points_are_chosen_evenly_and_every_cylinder_keeps_some():
     assert len(np.unique(chosen)) == len(chosen)
     counts = np.bincount(labels[chosen] + 1)
     assert counts[3] == 30
-    assert counts[2] >= LEAST
+    assert counts[2] >= LEAST_OF_EACH_CYLINDER
     assert counts[:2] / counts.sum() == pytest.approx([0.8, 0.19], abs=0.02)
     others = np.sort(chosen[labels[chosen] == -1])
     assert np.diff(others).max() < 2.1 * 800_000 / len(others)  # no stretch of the order is left out

@@ -35,10 +35,10 @@ MaskArray = NDArray[np.bool_]
 
 SMALLEST, LARGEST = 6.0, 0.25
 """Radii of neighbourhoods: in spacings, and as a share of the extent."""
-MOST = 2000
+ENOUGH_OF_A_BALL = 2000
 """Points of a neighbourhood that suffice."""
-LEAST = 8
-NEAR = 1.5
+LEAST_POINTS_OF_BALL = 8
+NEAR_IN_RADII = 1.5
 """Centres within so many radii of a sphere's centre tell whether the pipe is straight there."""
 
 
@@ -98,13 +98,13 @@ def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, s
         ball = np.array([*place, 0.0, 0.0, 1.0, 0.0])
         near = frame.points[cells.near_cylinder(ball, -reach, reach, 0.0, reach)]
         near = near[((near - place) ** 2).sum(axis=1) < reach * reach]
-        near = near[:: max(1, len(near) // MOST)]
-        if len(near) < LEAST:
+        near = near[:: max(1, len(near) // ENOUGH_OF_A_BALL)]
+        if len(near) < LEAST_POINTS_OF_BALL:
             return None
         samples = np.random.default_rng([seed, 14, k]).integers(len(near), size=(config.iterations, 4))
         sphere = np.empty(4)
         count = _search_sphere(near, samples, distance, radii[0], radii[1], sphere)
-        return sphere if count >= max(LEAST, config.min_share * len(near)) else None
+        return sphere if count >= max(LEAST_POINTS_OF_BALL, config.min_share * len(near)) else None
 
     with ThreadPoolExecutor(threads) as pool:
         found = [sphere for sphere in pool.map(work, range(config.seeds)) if sphere is not None]
@@ -158,7 +158,7 @@ def _straight(spheres: FloatArray, linearity: float) -> MaskArray:
     """Tell which spheres lie where the pipe is straight: their neighbours' centres spread along a line."""
     straight = np.zeros(len(spheres), np.bool_)
     for k, sphere in enumerate(spheres):
-        near = spheres[((spheres[:, :3] - sphere[:3]) ** 2).sum(axis=1) < (NEAR * sphere[3]) ** 2, :3]
+        near = spheres[((spheres[:, :3] - sphere[:3]) ** 2).sum(axis=1) < (NEAR_IN_RADII * sphere[3]) ** 2, :3]
         if len(near) < 4:
             continue
         variances = np.linalg.svd(near - near.mean(axis=0), compute_uv=False) ** 2

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from cylx.baselines.proposal import Proposal
 from cylx.config import LineFitConfig
 from cylx.fits.robust import WeightSchedule, fit_cylinder
-from cylx.geometry.cylinder import canonical_direction, cylinder_coordinates
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction, cylinder_coordinates
 from cylx.records import EllipseFit, Frame
 
 FloatArray = NDArray[np.float64]
 
-WIDE = 1e6
+UNBOUNDED_WIDTH = 1e6
 """A weight function so many radii wide is none."""
 
 
@@ -53,13 +53,13 @@ def fit_line_of_centres(fits: list[list[EllipseFit]], frame: Frame, config: Line
     if not config.refine:
         return [found]
     model = found.segment.model
-    _, distances, _ = cylinder_coordinates(frame.points, model[:3], model[3:6])
+    _, distances, _ = cylinder_coordinates(frame.points, model[POINT], model[DIRECTION])
     near = frame.points[np.abs(distances - radius) < config.reach * radius]
-    wide = WIDE * radius
+    wide = UNBOUNDED_WIDTH * radius
     fit = fit_cylinder(
         near, model, low=-math.inf, high=math.inf, schedule=WeightSchedule(wide, wide, 1.0, math.inf), steps=50
     )
     if fit is None:
         return [found]
     model = fit[0]
-    return [Proposal.spanning(model[:3], model[3:6], float(model[6]), near, len(ellipses))]
+    return [Proposal.spanning(model[POINT], model[DIRECTION], float(model[RADIUS]), near, len(ellipses))]

@@ -25,7 +25,7 @@ from cylx.baselines.normals import normals_for
 from cylx.baselines.proposal import Proposal
 from cylx.config import MsacConfig
 from cylx.fits.robust import WeightSchedule, fit_cylinder
-from cylx.geometry.cylinder import cylinder_coordinates
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ, cylinder_coordinates
 from cylx.records import Frame
 
 FloatArray = NDArray[np.float64]
@@ -35,7 +35,7 @@ LEAST_SINE = 1e-4
 """Normals that are more nearly parallel than this have no axis."""
 CHUNK = 250
 """Hypotheses a thread takes at a time; the number does not depend on that of the threads."""
-WIDE = 1e6
+UNBOUNDED_WIDTH = 1e6
 """A weight function so many times wider than the inliers' distance is none."""
 
 
@@ -80,15 +80,15 @@ def find_by_consensus(
         model = _best_of(points, normals, pairs, distance, limits.numbers, threads)
         if model is None:
             return
-        _, distances, _ = cylinder_coordinates(points, model[:3], model[3:6])
-        inliers = np.abs(distances - model[6]) < distance
+        _, distances, _ = cylinder_coordinates(points, model[POINT], model[DIRECTION])
+        inliers = np.abs(distances - model[RADIUS]) < distance
         if int(inliers.sum()) < least:
             return
         if config.refine:
             model = _refined(points[inliers], model, distance)
-            _, distances, _ = cylinder_coordinates(points, model[:3], model[3:6])
-        yield Proposal.spanning(model[:3], model[3:6], float(model[6]), points[inliers], 1)
-        left = np.abs(distances - model[6]) > config.removal * model[6]
+            _, distances, _ = cylinder_coordinates(points, model[POINT], model[DIRECTION])
+        yield Proposal.spanning(model[POINT], model[DIRECTION], float(model[RADIUS]), points[inliers], 1)
+        left = np.abs(distances - model[RADIUS]) > config.removal * model[RADIUS]
         if left.all():  # the same would be found again and again
             return
         points, normals = points[left], normals[left]
@@ -154,7 +154,7 @@ def _cylinder_through(
     if not (limits[0] <= radius <= limits[1]):
         return False
     model[0], model[1], model[2] = points[i, 0] + s * a0, points[i, 1] + s * a1, points[i, 2] + s * a2
-    model[3], model[4], model[5], model[6] = v0, v1, v2, radius
+    model[UX], model[UY], model[UZ], model[RADIUS] = v0, v1, v2, radius
     return True
 
 
@@ -164,8 +164,8 @@ def _loss(points: FloatArray, model: FloatArray, distance: float, record: float)
     loss, most = 0.0, distance * distance
     for i in range(len(points)):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
-        height = dx * model[3] + dy * model[4] + dz * model[5]
-        off = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height)) - model[6]
+        height = dx * model[UX] + dy * model[UY] + dz * model[UZ]
+        off = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height)) - model[RADIUS]
         loss += min(off * off, most)
         if loss >= record:
             return math.inf
@@ -174,7 +174,7 @@ def _loss(points: FloatArray, model: FloatArray, distance: float, record: float)
 
 def _refined(inliers: FloatArray, model: FloatArray, distance: float) -> FloatArray:
     """Fit a cylinder to its inliers by least squares of the orthogonal distances."""
-    wide = WIDE * distance
+    wide = UNBOUNDED_WIDTH * distance
     fit = fit_cylinder(
         inliers, model, low=-math.inf, high=math.inf, schedule=WeightSchedule(wide, wide, 1.0, math.inf), steps=50
     )

@@ -31,7 +31,7 @@ from cylx.config import TranConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.circle import fit_circle
 from cylx.geometry.coverage import covered_angle
-from cylx.geometry.cylinder import axis_basis, canonical_direction, cylinder_coordinates
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, axis_basis, canonical_direction, cylinder_coordinates
 from cylx.records import Frame
 
 FloatArray = NDArray[np.float64]
@@ -41,7 +41,7 @@ DRAWN = 4
 """Points drawn for each seed that is wanted; those on flat surface are no seeds."""
 GROWTH = 1.5
 """Factor of the neighbourhood's radius an iteration."""
-MOST = 2000
+ENOUGH_OF_A_NEIGHBOURHOOD = 2000
 """Points of a neighbourhood that suffice for a fit."""
 SHIFTS = 50
 STILL = 1e-4
@@ -97,14 +97,14 @@ def find_by_growing(
     starts = garden.curved_starts(drawn)[: config.seeds]
     with ThreadPoolExecutor(threads) as pool:
         grown = [one for one in pool.map(garden.grow, starts) if one is not None]
-    grown = [one for one in grown if limits.admit(one.model[3:6])]
+    grown = [one for one in grown if limits.admit(one.model[DIRECTION])]
     modes = shift_to_modes(
         np.array([one.model for one in grown]).reshape(-1, 7), math.radians(config.bandwidth_deg), config.bandwidth
     )
     for model, members in modes:
         if len(members) >= max(1.0, config.min_share * len(grown)):
             ends = np.concatenate([grown[k].ends for k in members])
-            yield Proposal.spanning(model[:3], model[3:6], float(model[6]), ends, len(members))
+            yield Proposal.spanning(model[POINT], model[DIRECTION], float(model[RADIUS]), ends, len(members))
 
 
 class _Garden:
@@ -150,7 +150,7 @@ class _Garden:
         for _ in range(self._config.iterations):
             if len(inliers) < 6:
                 return None
-            fitted = self._fit(inliers[:: max(1, len(inliers) // MOST)], place)
+            fitted = self._fit(inliers[:: max(1, len(inliers) // ENOUGH_OF_A_NEIGHBOURHOOD)], place)
             if fitted is None:
                 return None
             model = fitted
@@ -158,7 +158,7 @@ class _Garden:
             inliers, agreement = self._gather(model, place, reach)
         if len(inliers) < self._config.min_support or agreement < self._config.min_agreement:
             return None
-        heights, _, angles = cylinder_coordinates(self._points[inliers], model[:3], model[3:6])
+        heights, _, angles = cylinder_coordinates(self._points[inliers], model[POINT], model[DIRECTION])
         if covered_angle(angles) < math.radians(self._config.min_coverage_deg):
             return None
         return Grown(model, self._points[inliers[[int(heights.argmin()), int(heights.argmax())]]])
@@ -175,13 +175,13 @@ class _Garden:
 
     def _gather(self, model: FloatArray, place: FloatArray, reach: float) -> tuple[IndexArray, float]:
         """Give the points near the surface and the seed whose normals agree, and their share of all that are near."""
-        radius = float(model[6])
+        radius = float(model[RADIUS])
         inner, outer = max(0.0, radius - self._distance), radius + self._distance
         near = self._cells.near_cylinder(model, -reach, reach, inner, outer)
         away = self._points[near] - place
         near = near[np.einsum("ij,ij->i", away, away) < reach * reach]
-        across = np.column_stack(axis_basis(model[3:6]))
-        offsets = (self._points[near] - model[:3]) @ across
+        across = np.column_stack(axis_basis(model[DIRECTION]))
+        offsets = (self._points[near] - model[POINT]) @ across
         cosines = np.abs(np.einsum("ij,ij->i", offsets, self._normals[near] @ across)) / np.hypot(*offsets.T)
         agree = cosines > math.cos(math.radians(self._config.normal_angle_deg))
         return near[agree], float(agree.mean()) if len(agree) else 0.0
@@ -221,10 +221,10 @@ def _shifted(model: FloatArray, models: FloatArray, angle: float, length: float)
     for _ in range(SHIFTS):
         weights = np.exp(-0.5 * _squared_distances(model, models, angle, length))
         weights /= weights.sum()
-        signs = np.where(models[:, 3:6] @ model[3:6] < 0.0, -1.0, 1.0)
-        direction = canonical_direction((weights * signs) @ models[:, 3:6])
-        point = weights @ _feet(model[:3], models)
-        moved = np.concatenate([point, direction, [weights @ models[:, 6]]])
+        signs = np.where(models[:, DIRECTION] @ model[DIRECTION] < 0.0, -1.0, 1.0)
+        direction = canonical_direction((weights * signs) @ models[:, DIRECTION])
+        point = weights @ _feet(model[POINT], models)
+        moved = np.concatenate([point, direction, [weights @ models[:, RADIUS]]])
         still = _squared_distances(model, moved[None], angle, length)[0] < STILL**2
         model = moved
         if still:
@@ -234,15 +234,15 @@ def _shifted(model: FloatArray, models: FloatArray, angle: float, length: float)
 
 def _squared_distances(model: FloatArray, models: FloatArray, angle: float, length: float) -> FloatArray:
     """Give squared distances of cylinders (n, 7) from one, in bandwidths, shape (n,)."""
-    cosines = np.clip(np.abs(models[:, 3:6] @ model[3:6]), 0.0, 1.0)
-    offsets = np.linalg.norm(_feet(model[:3], models) - model[:3], axis=1)
-    scale = length * model[6]
+    cosines = np.clip(np.abs(models[:, DIRECTION] @ model[DIRECTION]), 0.0, 1.0)
+    offsets = np.linalg.norm(_feet(model[POINT], models) - model[POINT], axis=1)
+    scale = length * model[RADIUS]
     return np.asarray(
-        (np.arccos(cosines) / angle) ** 2 + (offsets / scale) ** 2 + ((models[:, 6] - model[6]) / scale) ** 2
+        (np.arccos(cosines) / angle) ** 2 + (offsets / scale) ** 2 + ((models[:, RADIUS] - model[RADIUS]) / scale) ** 2
     )
 
 
 def _feet(point: FloatArray, models: FloatArray) -> FloatArray:
     """Give the points nearest to one on the axes of cylinders (n, 7), shape (n, 3)."""
-    along = ((point - models[:, :3]) * models[:, 3:6]).sum(axis=1)
-    return np.asarray(models[:, :3] + along[:, None] * models[:, 3:6])
+    along = ((point - models[:, POINT]) * models[:, DIRECTION]).sum(axis=1)
+    return np.asarray(models[:, POINT] + along[:, None] * models[:, DIRECTION])

@@ -9,7 +9,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from cylx.geometry.cylinder import coordinates_of
+from cylx.geometry.cylinder import RADIUS, coordinates_of
 from cylx.records import IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
@@ -19,7 +19,7 @@ TRUNCATED = 0.9866
 """Standard deviation of a Gaussian cut off at three sigmas."""
 PLACES = 12.0
 """More places than these about an axis tell no more."""
-GAP = 4.0
+GAP_BEYOND_CHANCE = 4.0
 """A gap this much wider than is to be expected by chance is none by chance."""
 SPARSE = 0.2
 """Where there is less than this share of the usual density, points lie between lines."""
@@ -71,9 +71,11 @@ def look_at(segment: Segment, indexed: IndexedCloud) -> Shell:
     model, half = segment.model, segment.half
     noise = indexed.noise_about(model, half)
     deviation = max(min(segment.spread, 2.0 * noise), noise)
-    near = indexed.cells.near_cylinder(model, -half, half, 0.0, model[6] + max(0.5 * model[6], 10.0 * deviation))
+    near = indexed.cells.near_cylinder(
+        model, -half, half, 0.0, model[RADIUS] + max(0.5 * model[RADIUS], 10.0 * deviation)
+    )
     heights, residuals, angles = coordinates_of(indexed.points, near, model)
-    flat = ~indexed.may_be_on(near, model[6])
+    flat = ~indexed.may_be_on(near, model[RADIUS])
     on = (np.abs(residuals) < 3.0 * deviation) & ~flat
     return Shell(near, heights / max(half, 1e-300), residuals, angles, on, flat, deviation)
 
@@ -106,7 +108,7 @@ def distinct_places(angles: FloatArray, radius: float, deviation: float) -> floa
     ordered = ordered[_dense(ordered, 1.5 * deviation / radius)]
     # the widest gap to be expected of so many points at random is log(n) / n of the arc
     count = len(ordered)
-    widest = GAP * (ordered[-1] - ordered[0]) * math.log(count) / count
+    widest = GAP_BEYOND_CHANCE * (ordered[-1] - ordered[0]) * math.log(count) / count
     cuts = np.flatnonzero(np.diff(ordered) > max(widest, 3.0 * deviation / radius)) + 1
     lines = [line for line in np.split(ordered, cuts) if len(line) >= LINE_SHARE * count]
     if len(lines) < 2:
@@ -130,7 +132,7 @@ def shape_of(shell: Shell, segment: Segment, deviation: float) -> dict[str, floa
 
     Bulge and bend are not told apart where little of the arc is seen, so each is fitted without the other.
     """
-    radius, half = float(segment.model[6]), segment.half
+    radius, half = segment.radius, segment.half
     gram, right = np.zeros((9, 9)), np.zeros(9)
     _fill_shape(shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on], gram, right)
     gram[np.diag_indices(9)] *= 1.0 + 1e-12

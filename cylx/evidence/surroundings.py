@@ -13,7 +13,7 @@ from cylx.geometry.coverage import SECTORS, filled_sectors, sector_of
 FloatArray = NDArray[np.float64]
 MaskArray = NDArray[np.bool_]
 
-PIECES = 10
+PIECES_OF_HEIGHT = 10
 """Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
 THIRDS = 3
 """Pieces of the height over which flanks are counted: what touches a pipe at one place only is none."""
@@ -30,12 +30,12 @@ def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
 
     Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
     """
-    piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES).astype(np.int64), 0, PIECES - 1)
+    piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES_OF_HEIGHT).astype(np.int64), 0, PIECES_OF_HEIGHT - 1)
     outer = max(0.5 * radius, 10.0 * shell.deviation)
     on = np.abs(shell.residuals) < 3.0 * shell.deviation
     inside = shell.residuals < -4.0 * shell.deviation
     outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
-    counts = [np.bincount(piece[mask], minlength=PIECES) for mask in (on, inside, outside)]
+    counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT) for mask in (on, inside, outside)]
     full = counts[0] >= 1
     if not full.any():
         return 1.0, 1.0

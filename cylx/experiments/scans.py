@@ -15,7 +15,7 @@ FaceArray = NDArray[np.int64]
 
 SCANNED = 373_205
 """Points of the paper's scan of the soup can; a mesh is sampled with as many."""
-THICKNESS = 0.002
+NOISE_OF_SCAN = 0.002
 """Noise that is put on the points of a mesh, as a share of its extent: 0.3 mm of a soup can."""
 APART = 1.5
 """Distance of two cans, in extents."""
@@ -48,7 +48,7 @@ class ObjectScan:
         u, v = rng.random((2, SCANNED, 1))
         u, v = np.where(u + v > 1, 1 - u, u), np.where(u + v > 1, 1 - v, v)
         points = a[face] + u * (b - a)[face] + v * (c - a)[face]
-        return cls(points + THICKNESS * extent * rng.standard_normal(points.shape), extent)
+        return cls(points + NOISE_OF_SCAN * extent * rng.standard_normal(points.shape), extent)
 
     @property
     def name(self) -> str:
@@ -112,7 +112,7 @@ def cans_among_clutter(
     points : ndarray of shape (points, 3)
     centers : ndarray of shape (cans, 3)
     """
-    extent, noise = scan.extent, THICKNESS * scan.extent
+    extent, noise = scan.extent, NOISE_OF_SCAN * scan.extent
     places = np.array([(x, y, 0.0) for x in range(3) for y in range(3)])[rng.permutation(9)] * 1.3 * extent
     dense = len(scan.points) // 2  # of any other thing
     parts, centers = [], []

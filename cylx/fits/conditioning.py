@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
 from cylx.geometry.numerics import fill_basis
 
 FloatArray = NDArray[np.float64]
@@ -34,12 +35,12 @@ def given_radius(
     model, covariance : ndarray of shape (7,), (5, 5)
     """
     gain = covariance[:, 4] / (covariance[4, 4] + deviation**2)
-    step = gain * (radius - model[6])
+    step = gain * (radius - model[RADIUS])
     basis = np.empty((2, 3))
-    fill_basis(model[3:6], basis)
+    fill_basis(model[DIRECTION], basis)
     moved = model.copy()
-    moved[:3] += step[:2] @ basis
-    moved[3:6] += step[2:4] @ basis
-    moved[3:6] /= np.linalg.norm(moved[3:6])
-    moved[6] += step[4]
+    moved[POINT] += step[:2] @ basis
+    moved[DIRECTION] += step[2:4] @ basis
+    moved[DIRECTION] /= np.linalg.norm(moved[DIRECTION])
+    moved[RADIUS] += step[4]
     return moved, covariance - np.outer(gain, covariance[4])

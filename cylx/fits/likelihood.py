@@ -16,14 +16,15 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.fits.residual_law import BINS, Law, estimate_law
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ
 from cylx.geometry.numerics import fill_basis
 
 FloatArray = NDArray[np.float64]
 
-ROUNDS, STEPS = 3, 5
+MIXTURE_ROUNDS, STEPS_A_ROUND = 3, 5
 CLOSE = 1e-4
 """Steps end when one is shorter than this share of the deviation."""
-LEAST_POINTS = 12
+LEAST_POINTS_OF_MIXTURE = 12
 CONTRADICTION = 5.0
 """What is known and what the points say may differ by so many standard deviations."""
 _LOWER = np.tril_indices(5, -1)
@@ -72,13 +73,13 @@ class Prior(NamedTuple):
         """Leave out what a fit without it contradicts by `CONTRADICTION` standard deviations; None if that is all."""
         covariance, kept = fit.covariance, self
         if self.radius is not None:
-            away = fit.model[6] - self.radius
+            away = fit.model[RADIUS] - self.radius
             if away**2 > CONTRADICTION**2 * (covariance[4, 4] + self.radius_deviation**2):
                 kept = kept._replace(radius=None)
         if self.direction is not None:
             basis = np.empty((2, 3))
-            fill_basis(fit.model[3:6], basis)
-            tilts = basis @ self.direction * np.sign(self.direction @ fit.model[3:6])
+            fill_basis(fit.model[DIRECTION], basis)
+            tilts = basis @ self.direction * np.sign(self.direction @ fit.model[DIRECTION])
             spread = covariance[2:4, 2:4] + self.direction_deviation**2 * np.eye(2)
             if tilts @ np.linalg.solve(spread, tilts) > CONTRADICTION**2:
                 kept = kept._replace(direction=None)
@@ -119,16 +120,16 @@ def fit_mixture(
     fitted = np.array(model, dtype=np.float64)
     points = np.ascontiguousarray(points)
     law, symmetric = Law(min(deviation, 0.3 * width), min(3.0 * deviation, 0.6 * width), 0.1), True
-    for _ in range(ROUNDS):
+    for _ in range(MIXTURE_ROUNDS):
         counts = np.zeros(BINS)
         _count_residuals(points, fitted, low, high, width, counts)
         law = estimate_law(counts, width, law)
         weights = law.weights(width, outliers=symmetric)
-        for _ in range(STEPS):
+        for _ in range(STEPS_A_ROUND):
             sums = _Sums.of(points, fitted, low, high, width, weights)
             if prior is not None:
                 sums.know(prior, fitted)
-            size = _advance(fitted, sums) if sums.count >= LEAST_POINTS else math.inf
+            size = _advance(fitted, sums) if sums.count >= LEAST_POINTS_OF_MIXTURE else math.inf
             if not size < math.inf:
                 return None
             if size < CLOSE * law.deviation:
@@ -140,10 +141,10 @@ def fit_mixture(
     if prior is not None:
         sums.know(prior, fitted)
     covariance = sums.covariance()
-    aside = np.linalg.norm(np.cross(fitted[:3] - model[:3], model[3:6]))
-    if covariance is None or not abs(fitted[6] - model[6]) + aside < width:
+    aside = np.linalg.norm(np.cross(fitted[POINT] - model[POINT], model[DIRECTION]))
+    if covariance is None or not abs(fitted[RADIUS] - model[RADIUS]) + aside < width:
         return None
-    fitted[6] -= sums.count / sums.weight / (2.0 * fitted[6])
+    fitted[RADIUS] -= sums.count / sums.weight / (2.0 * fitted[RADIUS])
     return MixtureFit(fitted, covariance, law)
 
 
@@ -184,7 +185,7 @@ class _Sums:
         self = cls(max(abs(low), abs(high)))
         matrices = np.zeros((4, 5, 5))
         vectors = np.zeros((3, 5))
-        fill_basis(model[3:6], self.basis)
+        fill_basis(model[DIRECTION], self.basis)
         _fill_sums(points, model, self.basis, low, high, width, self.reach, weights, full, matrices, vectors)
         for matrix in matrices:
             matrix[_LOWER[1], _LOWER[0]] = matrix[_LOWER]
@@ -197,10 +198,10 @@ class _Sums:
         """Add what is known to the normal equations: a pseudo-observation of the radius, one of each tilt."""
         values, precisions = np.zeros(5), np.zeros(5)
         if prior.radius is not None:
-            biased = prior.radius + self.count / self.weight / (2.0 * model[6])  # as a fit to noisy points has it
-            values[4], precisions[4] = biased - model[6], prior.radius_deviation**-2
+            biased = prior.radius + self.count / self.weight / (2.0 * model[RADIUS])  # as a fit to noisy points has it
+            values[4], precisions[4] = biased - model[RADIUS], prior.radius_deviation**-2
         if prior.direction is not None:
-            direction = prior.direction * np.sign(prior.direction @ model[3:6])
+            direction = prior.direction * np.sign(prior.direction @ model[DIRECTION])
             values[2:4] = self.reach * (self.basis @ direction)
             precisions[2:4] = (self.reach * prior.direction_deviation) ** -2
         self.right += precisions * values
@@ -232,13 +233,13 @@ def _advance(model: FloatArray, sums: _Sums) -> float:
     except np.linalg.LinAlgError:
         return math.inf
     size = float(np.abs(step).max())
-    if not size < 0.5 * model[6]:
+    if not size < 0.5 * model[RADIUS]:
         return math.inf
-    model[:3] += step[:2] @ sums.basis
-    model[3:6] += step[2:4] @ sums.basis / sums.reach
-    model[3:6] /= np.linalg.norm(model[3:6])
-    model[6] += step[4]
-    return size if model[6] > 0.0 else math.inf
+    model[POINT] += step[:2] @ sums.basis
+    model[DIRECTION] += step[2:4] @ sums.basis / sums.reach
+    model[DIRECTION] /= np.linalg.norm(model[DIRECTION])
+    model[RADIUS] += step[4]
+    return size if model[RADIUS] > 0.0 else math.inf
 
 
 @njit(cache=True, nogil=True)
@@ -250,9 +251,9 @@ def _count_residuals(
         z, square = 0.0, 0.0
         for d in range(3):
             offset = points[i, d] - model[d]
-            z += offset * model[3 + d]
+            z += offset * model[UX + d]
             square += offset * offset
-        residual = abs(math.sqrt(max(square - z * z, 0.0)) - model[6])
+        residual = abs(math.sqrt(max(square - z * z, 0.0)) - model[RADIUS])
         if low <= z <= high and residual < width:
             # shared by the two nearest steps, so that rounding chooses nothing
             place = max(0.0, residual / width * len(counts) - 0.5)
@@ -279,13 +280,13 @@ def _fill_sums(
     row = np.empty(5)
     for i in range(len(points)):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
-        z = dx * model[3] + dy * model[4] + dz * model[5]
+        z = dx * model[UX] + dy * model[UY] + dz * model[UZ]
         if z < low or z > high:
             continue
         x = dx * basis[0, 0] + dy * basis[0, 1] + dz * basis[0, 2]
         y = dx * basis[1, 0] + dy * basis[1, 1] + dz * basis[1, 2]
         distance = math.sqrt(x * x + y * y) + 1e-300
-        residual = distance - model[6]
+        residual = distance - model[RADIUS]
         if abs(residual) >= width:
             continue
         place = abs(residual) / width * (len(weights) - 1)

@@ -17,13 +17,13 @@ Decision = Literal["snapped", "ambiguous", "none"]
 DECISIVE = 20.0
 """Least likelihood ratio of an entry to each of its rivals; against one that was as likely beforehand, the entry is
 right in 20 cases of 21."""
-NEAR = 3.0
+NEAR_IN_DEVIATIONS = 3.0
 """Most standard deviations between a radius and the entry that it is taken for."""
 WIDER = 2.0
 """What is of no entry may be so many times smaller or larger than all of them."""
 EXACT = 1e-12
 """No radius is known better than to this share of it: numbers are rounded."""
-MOST = 1e9
+MOST_RATIO = 1e9
 """Ratios are given up to this, and down to its inverse; beyond, they say nothing that they did not say before."""
 
 
@@ -55,7 +55,7 @@ class Choice:
         Its position in the catalogue; of the entry with the nearest radius if none is near.
     ratio : float
         Of its likelihood to the greater one of its two rivals: the second entry, and no entry at all; in
-        [1 / `MOST`, `MOST`].
+        [1 / `MOST_RATIO`, `MOST_RATIO`].
     radius, deviation : float
         What was decided upon, in the unit of the catalogue.
     """
@@ -99,7 +99,7 @@ def choose_entry(radius: float, deviation: float, catalogue: Catalogue) -> Choic
     ]
     span = 2.0 * math.log(WIDER) + math.log(max(catalogue.radii)) - math.log(min(catalogue.radii))
     nothing = -math.log(span)
-    near = [i for i, z in enumerate(away) if z <= NEAR]
+    near = [i for i, z in enumerate(away) if z <= NEAR_IN_DEVIATIONS]
     if near:
         best = max(near, key=logs.__getitem__)
     else:  # the likeliest one in the far tails is that of the largest tolerance, which nobody would look for
@@ -109,5 +109,5 @@ def choose_entry(radius: float, deviation: float, catalogue: Catalogue) -> Choic
     decision: Decision = "none"
     if near and logs[best] > nothing:
         decision = "snapped" if log_ratio >= math.log(DECISIVE) else "ambiguous"
-    limit = math.log(MOST)
+    limit = math.log(MOST_RATIO)
     return Choice(decision, best, math.exp(min(max(log_ratio, -limit), limit)), radius, deviation)

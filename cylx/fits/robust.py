@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.geometry.numerics import FINITE, REORDERED, fill_basis, solve_in_place
 
 FloatArray = NDArray[np.float64]
@@ -25,6 +26,8 @@ TUKEY_SPREAD = 1.0989
 """Standard deviation of Gaussian residuals over that of the same residuals weighted by the biweight at 4.685."""
 
 
+FIT_BEYOND_ENDS = 1.02
+"""A fit goes this much further than the ends: the outermost points lie on them, and rounding would choose."""
 POLISH_STEPS = 10
 SOME, LAST_STEPS = 150, 3
 """Points that suffice for the first steps of a polish, and steps with all of them."""
@@ -71,9 +74,9 @@ def _accumulate(
     sums: FloatArray,
 ) -> None:
     """Fill the weighted normal equations of a step; `sums` gets the weights, and the squares of residuals."""
-    fill_basis(model[3:6], basis)
-    px, py, pz, radius = model[0], model[1], model[2], model[6]
-    ux, uy, uz = model[3], model[4], model[5]
+    fill_basis(model[UX : UZ + 1], basis)
+    px, py, pz, radius = model[0], model[1], model[2], model[RADIUS]
+    ux, uy, uz = model[UX], model[UY], model[UZ]
     fx, fy, fz = basis[0, 0], basis[0, 1], basis[0, 2]
     gx, gy, gz = basis[1, 0], basis[1, 1], basis[1, 2]
     weights, squares = 0.0, 0.0
@@ -119,16 +122,16 @@ def _advance(model: FloatArray, right: FloatArray, basis: FloatArray, reach: flo
     """Move the model by a step, at most half a radius long; give the undamped length of the step."""
     size = max(max(abs(right[0]), abs(right[1])), abs(right[4]))
     size = max(size, max(abs(right[2]), abs(right[3])) * reach)
-    damping = 1.0 if size < 0.5 * model[6] else 0.5 * model[6] / size
+    damping = 1.0 if size < 0.5 * model[RADIUS] else 0.5 * model[RADIUS] / size
     length = 0.0
     for d in range(3):
         model[d] += damping * (right[0] * basis[0, d] + right[1] * basis[1, d])
-        model[3 + d] += damping * (right[2] * basis[0, d] + right[3] * basis[1, d])
-        length += model[3 + d] ** 2
+        model[UX + d] += damping * (right[2] * basis[0, d] + right[3] * basis[1, d])
+        length += model[UX + d] ** 2
     length = math.sqrt(length)
     for d in range(3):
-        model[3 + d] /= length
-    model[6] += damping * right[4]
+        model[UX + d] /= length
+    model[RADIUS] += damping * right[4]
     return float(size)
 
 
@@ -165,7 +168,7 @@ def fit_in_place(
             return -1.0
         spread = math.sqrt(sums[1] / sums[0])
         size = _advance(model, right, basis, reach)
-        if not (0.0 < model[6] < 1e12):
+        if not (0.0 < model[RADIUS] < 1e12):
             return -1.0
         last = width
         width = max(floor, min(decay * width, tuning * spread))
@@ -220,9 +223,9 @@ def candidate_quality(
 
     The inliers (within `width` of the surface), and the extent of their heights.
     """
-    fill_basis(model[3:6], basis)
-    px, py, pz, radius = model[0], model[1], model[2], model[6]
-    ux, uy, uz = model[3], model[4], model[5]
+    fill_basis(model[UX : UZ + 1], basis)
+    px, py, pz, radius = model[0], model[1], model[2], model[RADIUS]
+    ux, uy, uz = model[UX], model[UY], model[UZ]
     fx, fy, fz = basis[0, 0], basis[0, 1], basis[0, 2]
     gx, gy, gz = basis[1, 0], basis[1, 1], basis[1, 2]
     lowest, highest, count = 1e300, -1e300, 0.0
@@ -273,8 +276,8 @@ def polish(
     """
     matrix, right, basis = np.empty((5, 5)), np.empty(5), np.empty((2, 3))
     schedule = np.empty(6)
-    floor = max(3.0 * noise, 0.01 * model[6])
-    schedule[0], schedule[1], schedule[2] = max(0.3 * model[6], 4.0 * noise), floor, 0.6
+    floor = max(3.0 * noise, 0.01 * model[RADIUS])
+    schedule[0], schedule[1], schedule[2] = max(0.3 * model[RADIUS], 4.0 * noise), floor, 0.6
     schedule[3], schedule[4], schedule[5] = math.inf, 1e-2, POLISH_STEPS
     stride = max(1, n // SOME)
     if stride > 1:
@@ -288,7 +291,7 @@ def polish(
             return 0
         schedule[0], schedule[5] = floor, LAST_STEPS  # some of the points brought it near, all decide
     spread = fit_in_place(xyz, n, model, -math.inf, math.inf, schedule, matrix, right, basis)
-    if spread < 0.0 or spread > SHARP * floor or not (least <= model[6] <= greatest):
+    if spread < 0.0 or spread > SHARP * floor or not (least <= model[RADIUS] <= greatest):
         return 0
     candidate_quality(xyz, n, model, 3.0 * noise, basis, quality)
     quality[2] = spread
@@ -301,6 +304,6 @@ def move_to_foot(model: FloatArray, center: FloatArray) -> None:
     """Take a model given about `center` back to the frame of `center`, its point at the axis point nearest to it."""
     foot = 0.0
     for d in range(3):
-        foot -= model[d] * model[3 + d]
+        foot -= model[d] * model[UX + d]
     for d in range(3):
-        model[d] += foot * model[3 + d] + center[d]
+        model[d] += foot * model[UX + d] + center[d]

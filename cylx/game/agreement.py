@@ -8,6 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.records import Candidates, Segment
 
 FloatArray = NDArray[np.float64]
@@ -26,7 +27,7 @@ SAME = 0.15, math.cos(math.radians(6.0)), 0.1
 
 def least_telling(segment: Segment) -> float:
     """Give the radius from which a window can tell a cylinder."""
-    return float(WITNESS * min(segment.model[6], 1.2 * segment.half))
+    return float(WITNESS * min(segment.radius, 1.2 * segment.half))
 
 
 class Neighbourhood:
@@ -66,7 +67,7 @@ class Neighbourhood:
         self, segment: Segment, alive: NDArray[np.bool_], offset: float, angle_deg: float, radius: float
     ) -> IndexArray:
         """Give those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
-        reach = segment.half + float(segment.model[6])
+        reach = segment.half + segment.radius
         part = self._beside(segment, reach)
         found = np.empty(part.stop - part.start, np.int64)
         cosine = math.cos(math.radians(angle_deg))
@@ -77,7 +78,7 @@ class Neighbourhood:
 
     def _beside(self, segment: Segment, reach: float) -> slice:
         """Give those that a cylinder as long as this may hold."""
-        x, width = float(segment.model[0]), abs(float(segment.model[3])) * reach + float(segment.model[6])
+        x, width = float(segment.point[0]), abs(float(segment.direction[0])) * reach + segment.radius
         first, last = np.searchsorted(self._models[:, 0], [x - width, x + width])
         return slice(int(first), int(last))
 
@@ -98,12 +99,12 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
     Offset in the cylinder's radii, cosine of the angle, relative radius.
     """
     dx, dy, dz = row[0] - model[0], row[1] - model[1], row[2] - model[2]
-    height = dx * model[3] + dy * model[4] + dz * model[5]
+    height = dx * model[UX] + dy * model[UY] + dz * model[UZ]
     square = dx * dx + dy * dy + dz * dz - height * height
-    if abs(height) >= reach or square >= model[6] * model[6]:
+    if abs(height) >= reach or square >= model[RADIUS] * model[RADIUS]:
         return 0
-    turn, ratio = row[3] * model[3] + row[4] * model[4] + row[5] * model[5], row[6] / model[6]
-    if square >= (offset * model[6]) ** 2 or abs(turn) <= cosine:
+    turn, ratio = row[UX] * model[UX] + row[UY] * model[UY] + row[UZ] * model[UZ], row[RADIUS] / model[RADIUS]
+    if square >= (offset * model[RADIUS]) ** 2 or abs(turn) <= cosine:
         return 1 if ALIKE < ratio < 1.0 / ALIKE else 0
     if abs(ratio - 1.0) < radius:
         return 2

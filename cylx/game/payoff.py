@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.game.dynamics import SparsePayoff
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
 
 PIECE = 4096
@@ -20,7 +21,7 @@ IndexArray = NDArray[np.int64]
 
 CUT = 0.1
 """Local payoffs below this are zero."""
-REACH = 4.0
+REACH_IN_RADII = 4.0
 """Candidates play against those within this many radii, or their own extent if that is more."""
 
 
@@ -44,10 +45,10 @@ def screw_payoff(models: FloatArray, parents: IndexArray, scale: float, min_rati
     """
     if len(models) == 0:
         return np.zeros((0, 0))
-    unit = float(np.median(models[:, 6]))
-    middle = np.median(models[:, :3], axis=0)
-    radii = models[:, 6] / unit
-    distance, gap = pairwise_screw_distances((models[:, :3] - middle) / unit, models[:, 3:6])
+    unit = float(np.median(models[:, RADIUS]))
+    middle = np.median(models[:, POINT], axis=0)
+    radii = models[:, RADIUS] / unit
+    distance, gap = pairwise_screw_distances((models[:, POINT] - middle) / unit, models[:, DIRECTION])
     ratio = np.minimum.outer(radii, radii) / np.maximum.outer(radii, radii)
     compatible = (gap < np.add.outer(radii, radii)) & (ratio > min_ratio) & (parents[:, None] != parents[None, :])
     return np.where(compatible, np.exp(-distance / scale), 0.0)  # eq. 2 and 5
@@ -87,8 +88,8 @@ def local_payoff(
     """
     least_ratio = max(min_ratio, 1.0 + math.log(CUT) * radius)
     # by bins of the radius, of which only neighbours can be compatible, and of the reach; along x within a bin
-    reaches = np.maximum(REACH * models[:, 6], extents)
-    radius_bins = np.floor(np.log(models[:, 6]) / -math.log(least_ratio)).astype(np.int64)
+    reaches = np.maximum(REACH_IN_RADII * models[:, RADIUS], extents)
+    radius_bins = np.floor(np.log(models[:, RADIUS]) / -math.log(least_ratio)).astype(np.int64)
     keys = (radius_bins << 12) + np.floor(np.log2(reaches)).astype(np.int64) + 2048
     order = np.lexsort((models[:, 0], keys)).astype(np.int64)
     bins, starts = np.unique(keys[order], return_index=True)
@@ -159,7 +160,7 @@ def _pairs(
                     break
                 if abs(models[j, 1] - models[i, 1]) > span or abs(models[j, 2] - models[i, 2]) > span:
                     continue
-                reach = max(REACH * 0.5 * (models[i, 6] + models[j, 6]), max(extents[i], extents[j]))
+                reach = max(REACH_IN_RADII * 0.5 * (models[i, RADIUS] + models[j, RADIUS]), max(extents[i], extents[j]))
                 value = _play(models[i], models[j], reach, least_ratio, widths)
                 if value == 0.0 or parents[i] == parents[j]:
                     continue
@@ -214,19 +215,19 @@ def _play(
     bound = -math.log(CUT)
     dx, dy, dz = other[0] - one[0], other[1] - one[1], other[2] - one[2]
     square = dx * dx + dy * dy + dz * dz
-    ratio = min(one[6], other[6]) / max(one[6], other[6])
+    ratio = min(one[RADIUS], other[RADIUS]) / max(one[RADIUS], other[RADIUS])
     if square > reach * reach or ratio < least_ratio:
         return 0.0
-    cx = one[4] * other[5] - one[5] * other[4]
-    cy = one[5] * other[3] - one[3] * other[5]
-    cz = one[3] * other[4] - one[4] * other[3]
+    cx = one[UY] * other[UZ] - one[UZ] * other[UY]
+    cy = one[UZ] * other[UX] - one[UX] * other[UZ]
+    cz = one[UX] * other[UY] - one[UY] * other[UX]
     turn = math.sqrt(cx * cx + cy * cy + cz * cz)
     if turn > math.sin(min(1.5, bound * widths[0])):
         return 0.0
-    a = dx * one[3] + dy * one[4] + dz * one[5]
-    b = dx * other[3] + dy * other[4] + dz * other[5]
+    a = dx * one[UX] + dy * one[UY] + dz * one[UZ]
+    b = dx * other[UX] + dy * other[UY] + dz * other[UZ]
     shift = math.sqrt(max(0.0, square - a * a)) + math.sqrt(max(0.0, square - b * b))
-    shift /= one[6] + other[6]
+    shift /= one[RADIUS] + other[RADIUS]
     strangeness = (math.asin(min(1.0, turn)) / widths[0]) ** 2 + (shift / widths[1]) ** 2
     strangeness += ((1.0 - ratio) / widths[2]) ** 2
     return math.exp(-math.sqrt(strangeness)) if strangeness <= bound * bound else 0.0

@@ -8,12 +8,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.geometry.morton import BITS, cell_starts
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-BLOCK = 32
+RUNS_IN_BLOCK = 32
 """Runs in a block; most blocks lie apart from a line as a whole."""
 
 
@@ -37,7 +38,7 @@ class Cells:
             level += 1
         _, self._starts = cell_starts(codes, level)
         self._balls = _balls_of(points, self._starts)
-        self._blocks = _balls_of(points, np.append(self._starts[:-1:BLOCK], self._starts[-1]))
+        self._blocks = _balls_of(points, np.append(self._starts[:-1:RUNS_IN_BLOCK], self._starts[-1]))
 
     def near_cylinder(self, model: FloatArray, low: float, high: float, inner: float, outer: float) -> IndexArray:
         """Give the points between two heights and two distances from an axis.
@@ -88,7 +89,9 @@ class Cells:
         -------
         ndarray of shape (n, 3)
         """
-        near = self.near_cylinder(model, -half, half, max(0.0, float(model[6]) - width), float(model[6]) + width)
+        near = self.near_cylinder(
+            model, -half, half, max(0.0, float(model[RADIUS]) - width), float(model[RADIUS]) + width
+        )
         stride = max(1, len(near) // most) if most else 1
         points = np.empty(((len(near) + stride - 1) // stride, 3))
         return points[: _copy_marked(self.points, near, stride, marks, limit, points)]
@@ -135,7 +138,7 @@ def _apart(
 ) -> bool:
     """Tell whether a ball of radius `reach` lies outside the hollow cylinder altogether."""
     dx, dy, dz = x - model[0], y - model[1], z - model[2]
-    height = dx * model[3] + dy * model[4] + dz * model[5]
+    height = dx * model[UX] + dy * model[UY] + dz * model[UZ]
     if height < low - reach or height > high + reach:
         return True
     square = max(0.0, dx * dx + dy * dy + dz * dz - height * height)
@@ -161,7 +164,7 @@ def _find_runs(
     for b in range(len(blocks)):
         if _apart(blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3], model, low, high, inner, outer):
             continue
-        for c in range(b * BLOCK, min((b + 1) * BLOCK, len(balls))):
+        for c in range(b * RUNS_IN_BLOCK, min((b + 1) * RUNS_IN_BLOCK, len(balls))):
             if not _apart(balls[c, 0], balls[c, 1], balls[c, 2], balls[c, 3], model, low, high, inner, outer):
                 runs[count] = c
                 count += 1

@@ -15,6 +15,11 @@ from cylx.geometry.numerics import cross, fill_basis
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
+POINT, DIRECTION, RADIUS = slice(0, 3), slice(3, 6), 6
+"""Where a cylinder as a row of seven numbers has a point of its axis, the unit direction and the radius."""
+UX, UY, UZ = 3, 4, 5
+"""Where it has the components of the direction: kernels work with single numbers."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cylinder:
@@ -197,15 +202,15 @@ def fill_coordinates(
 ) -> int:
     """Fill in height, signed distance to the surface, and angle of the points within `width` of it; count them."""
     basis = np.empty((2, 3))
-    fill_basis(model[3:6], basis)
+    fill_basis(model[UX : UZ + 1], basis)
     n = 0
     for i in range(len(points)):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
         x = dx * basis[0, 0] + dy * basis[0, 1] + dz * basis[0, 2]
         y = dx * basis[1, 0] + dy * basis[1, 1] + dz * basis[1, 2]
-        residual = math.sqrt(x * x + y * y) - model[6]
+        residual = math.sqrt(x * x + y * y) - model[RADIUS]
         if abs(residual) < width:
-            heights[n] = dx * model[3] + dy * model[4] + dz * model[5]
+            heights[n] = dx * model[UX] + dy * model[UY] + dz * model[UZ]
             residuals[n], angles[n] = residual, math.atan2(y, x)
             n += 1
     return n

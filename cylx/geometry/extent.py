@@ -13,7 +13,7 @@ from cylx.geometry.numerics import median_of_positive, sort_in_place
 FloatArray = NDArray[np.float64]
 
 ARC_BINS = 24
-LEAST = 15
+LEAST_POINTS_OF_EXTENT = 15
 """Points without which an extent cannot be told."""
 FAINT = 0.2
 """A piece with less than this share of what one of the known part holds on average shows something that passes by."""
@@ -72,7 +72,7 @@ def _find_ends(
         if abs(heights[i]) <= half:
             counts[_bin(angles[i])] += 1.0
             core += 1
-    if core < LEAST:
+    if core < LEAST_POINTS_OF_EXTENT:
         return False
     least = max(0.5, 0.15 * median_of_positive(counts, len(counts), scratch))
     width, on = np.int64(0), 0.0

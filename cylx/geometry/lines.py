@@ -12,7 +12,7 @@ from cylx.geometry.numerics import cross, symmetric_eigen
 
 FloatArray = NDArray[np.float64]
 
-LEAST = 8
+LEAST_POINTS_OF_LINE = 8
 """Points that a line is fitted to."""
 
 PARALLEL = 1e-8
@@ -121,7 +121,7 @@ def fit_line(xyz: FloatArray, n: int, reach: float, place: FloatArray, direction
                 count += 1
                 for d in range(3):
                     total[d] += xyz[d, i]
-        if count < LEAST:
+        if count < LEAST_POINTS_OF_LINE:
             return math.inf, 1.0
         for d in range(3):
             place[d] = total[d] / count

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.cylinder import RADIUS, UX
 from cylx.geometry.numerics import REORDERED, fill_basis, solve_in_place, symmetric_eigen
 
 FloatArray = NDArray[np.float64]
@@ -214,19 +215,19 @@ def _fill_model(
         ax, ay = 1.0, 0.0
     length, along = 0.0, 0.0
     for d in range(3):
-        model[3 + d] = basis[0, d] * ax + basis[1, d] * ay + normal[d] * (gx * ax + gy * ay)
-        length += model[3 + d] ** 2
+        model[UX + d] = basis[0, d] * ax + basis[1, d] * ay + normal[d] * (gx * ax + gy * ay)
+        length += model[UX + d] ** 2
     length = math.sqrt(length)
     for d in range(3):
-        model[3 + d] /= length
+        model[UX + d] /= length
         model[d] = (normal[d] - gx * basis[0, d] - gy * basis[1, d]) / slant
-        along += model[d] * model[3 + d]
+        along += model[d] * model[UX + d]
     inward = 0.0
     for d in range(3):
-        model[d] -= along * model[3 + d]
+        model[d] -= along * model[UX + d]
         inward += model[d] ** 2
     inward = math.sqrt(inward)
     for d in range(3):
         model[d] = center[d] + normal[d] * terms[5] + model[d] / (inward * strong)
-    model[6] = 1.0 / abs(strong)
+    model[RADIUS] = 1.0 / abs(strong)
     return True

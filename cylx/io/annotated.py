@@ -15,7 +15,7 @@ from cylx.io.inputs import excerpt, printable
 from cylx.io.names import mended_names
 from cylx.io.outputs import open_output
 from cylx.io.pcd import write_pcd
-from cylx.io.ply import BLOCK, ply_type, write_ply
+from cylx.io.ply import ROWS_AT_A_TIME, ply_type, write_ply
 from cylx.palette import cylinder_colors
 
 if TYPE_CHECKING:
@@ -140,8 +140,8 @@ def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray
     cloud = extraction.cloud
     labels = cloud.spread(extraction.labels, -1)
     residuals = cloud.spread(extraction.residuals, np.nan)
-    for start in range(0, cloud.rows, BLOCK):
-        part = slice(start, start + BLOCK)
+    for start in range(0, cloud.rows, ROWS_AT_A_TIME):
+        part = slice(start, start + ROWS_AT_A_TIME)
         ids = labels[part]
         colors = cylinder_colors(ids).T
         found = {"cylinder_id": ids, "residual": np.where(ids < 0, np.nan, residuals[part])}

@@ -14,7 +14,7 @@ from cylx.io.names import coordinate_names, mended_names
 from cylx.io.outputs import open_output
 from cylx.io.packed import unpacked
 from cylx.io.pcd import read_pcd, write_pcd
-from cylx.io.ply import BLOCK, ply_type, read_ply, write_ply
+from cylx.io.ply import ROWS_AT_A_TIME, ply_type, read_ply, write_ply
 from cylx.io.xyz import read_xyz, write_xyz
 from cylx.records import PointCloud, Selection, Source
 
@@ -178,5 +178,5 @@ def _plain_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
 
 
 def _blocks(table: NDArray[np.void]) -> Iterator[NDArray[np.void]]:
-    for start in range(0, len(table), BLOCK):
-        yield table[start : start + BLOCK]
+    for start in range(0, len(table), ROWS_AT_A_TIME):
+        yield table[start : start + ROWS_AT_A_TIME]

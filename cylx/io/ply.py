@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from cylx.io.inputs import Input
 
-BLOCK = 1 << 16  # rows written at a time
+ROWS_AT_A_TIME = 1 << 16  # rows written at a time
 
 
 def read_ply(source: Input) -> NDArray[np.void]:

@@ -115,7 +115,7 @@ def _rejections(
     out = []
     for rejected_segment in refused:
         segment = rejected_segment.segment
-        if not (np.isfinite(segment.model).all() and segment.model[6] > 0.0 and segment.half >= 0.0):
+        if not (np.isfinite(segment.model).all() and segment.radius > 0.0 and segment.half >= 0.0):
             continue
         _, residuals, angles = surface_points(segment, indexed)
         fit = CylinderFit(

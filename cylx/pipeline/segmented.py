@@ -14,10 +14,18 @@ from numpy.typing import NDArray
 
 from cylx.errors import InputError
 from cylx.fits.likelihood import fit_mixture
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, unbiased_radius
+from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, unbiased_radius
 from cylx.fits.robust import fit_cylinder as fit_robustly
 from cylx.geometry.coverage import covered_angle
-from cylx.geometry.cylinder import Cylinder, axis_basis, canonical_direction, cylinder_coordinates
+from cylx.geometry.cylinder import (
+    DIRECTION,
+    POINT,
+    RADIUS,
+    Cylinder,
+    axis_basis,
+    canonical_direction,
+    cylinder_coordinates,
+)
 from cylx.records import CylinderFit, PointCloud
 from cylx.scene import check_usable
 
@@ -26,23 +34,22 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-DIRECTIONS = 500
+DIRECTIONS_TRIED = 500
 """Directions tried at first, over the half sphere: six degrees apart."""
-CONES = (0.1, 0.03, 0.01)
+CONES_ABOUT_BEST = (0.1, 0.03, 0.01)
 """Then others about the best: within so many radians."""
 FINALISTS = 6
-ENOUGH = 250
+ENOUGH_TO_COMPARE_DIRECTIONS = 250
 """Points that suffice to compare directions."""
-LEAST = 20
-FEW = 150
+LEAST_POINTS_TO_FIT = 20
+LEAST_POINTS_FOR_OUTLIERS = 150
 """Fewer points than this do not tell how their outliers scatter."""
-CURVED = 3.0
+CURVED_IN_DEVIATIONS = 3.0
 """A radius of fewer standard deviations cannot be told from that of a plane."""
-LOOSEST = math.radians(15.0)
+LOOSEST_DIRECTION = math.radians(15.0)
 """A direction less certain than this is none."""
-LEAST_SHARE = 0.5
+LEAST_SHARE_ON_CYLINDER = 0.5
 """Of the points of one cylinder, more than this share lies on it."""
-BEYOND = 1.02
 _REMEDY = "take the points of one cylinder, more of them or from further about it"
 
 
@@ -83,8 +90,8 @@ def fit_cylinder(points: ArrayLike | PointCloud, *, start: Cylinder | None = Non
     """
     cloud = points if isinstance(points, PointCloud) else PointCloud.from_array(points)
     place = cloud.source.file
-    if len(cloud.points) < LEAST:
-        raise InputError(place, f"only {len(cloud.points)} usable points", f"take at least {LEAST}")
+    if len(cloud.points) < LEAST_POINTS_TO_FIT:
+        raise InputError(place, f"only {len(cloud.points)} usable points", f"take at least {LEAST_POINTS_TO_FIT}")
     check_usable(cloud.points, place)
     # scaled to about unity about its middle, so that neither unit nor origin matters
     origin = cloud.points.mean(axis=0)
@@ -107,14 +114,14 @@ def _as_model(cylinder: Cylinder) -> FloatArray:
 def _starts(points: FloatArray) -> list[FloatArray]:
     """Give rough cylinders (7,), the best first: the circles that the points are nearest to, seen along an axis."""
     sample = points
-    if len(points) > ENOUGH:
-        sample = points[np.random.default_rng(0).choice(len(points), ENOUGH, replace=False)]
+    if len(points) > ENOUGH_TO_COMPARE_DIRECTIONS:
+        sample = points[np.random.default_rng(0).choice(len(points), ENOUGH_TO_COMPARE_DIRECTIONS, replace=False)]
     principal = np.linalg.svd(sample - sample.mean(axis=0), full_matrices=False)[2]
-    directions = np.concatenate([principal, _sphere(DIRECTIONS)])
+    directions = np.concatenate([principal, _sphere(DIRECTIONS_TRIED)])
     models, scores = _circles(sample, directions)
-    for cone in CONES:
+    for cone in CONES_ABOUT_BEST:
         best = models[np.argsort(scores)[:FINALISTS]]
-        more, found = _circles(sample, np.concatenate([_about(model[3:6], cone) for model in best]))
+        more, found = _circles(sample, np.concatenate([_about(model[DIRECTION], cone) for model in best]))
         models, scores = np.concatenate([models, more]), np.concatenate([scores, found])
     return list(models[np.argsort(scores)[:FINALISTS]])
 
@@ -176,17 +183,19 @@ def _best_fit(points: FloatArray, starts: list[FloatArray]) -> tuple[FloatArray,
     best: tuple[FloatArray, float] | None = None
     least = math.inf
     for start in starts:
-        away = np.median(np.abs(cylinder_coordinates(points, start[:3], start[3:6])[1] - start[6]))
+        away = np.median(np.abs(cylinder_coordinates(points, start[POINT], start[DIRECTION])[1] - start[RADIUS]))
         width = max(8.0 * float(away), 1e-9)
-        floor = width if len(points) < FEW else 1e-9
+        floor = width if len(points) < LEAST_POINTS_FOR_OUTLIERS else 1e-9
         schedule = WeightSchedule(width, floor, 1.0, TUKEY * TUKEY_SPREAD, 1e-6)
         fit = fit_robustly(points, start, low=-math.inf, high=math.inf, schedule=schedule, steps=100)
         if fit is None:
             continue
         model, spread = fit
-        score = float(np.median(np.abs(cylinder_coordinates(points, model[:3], model[3:6])[1] - model[6])))
+        score = float(
+            np.median(np.abs(cylinder_coordinates(points, model[POINT], model[DIRECTION])[1] - model[RADIUS]))
+        )
         if score < least:
-            best, least = (model, max(spread * TUKEY_SPREAD, 1e-9 * model[6])), score
+            best, least = (model, max(spread * TUKEY_SPREAD, 1e-9 * model[RADIUS])), score
     return best
 
 
@@ -201,26 +210,26 @@ class _Fit(NamedTuple):
 
 def _likeliest(points: FloatArray, model: FloatArray, deviation: float) -> _Fit | None:
     """Fit by maximum likelihood between the ends of the points on the surface, if they are enough for it."""
-    if len(points) < FEW:
+    if len(points) < LEAST_POINTS_FOR_OUTLIERS:
         steady = _fit_steadily(points, model)
         if steady is None:
             return None
         model, deviation = steady
     model = model.copy()
-    model[3:6] = canonical_direction(model[3:6])  # which the covariance goes by
-    heights, distances, angles = cylinder_coordinates(points, model[:3], model[3:6])
-    on = np.abs(distances - model[6]) < 3.0 * deviation
-    if on.sum() < LEAST:
+    model[DIRECTION] = canonical_direction(model[DIRECTION])  # which the covariance goes by
+    heights, distances, angles = cylinder_coordinates(points, model[POINT], model[DIRECTION])
+    on = np.abs(distances - model[RADIUS]) < 3.0 * deviation
+    if on.sum() < LEAST_POINTS_TO_FIT:
         return None
     low, high = float(heights[on].min()), float(heights[on].max())
     half, middle = 0.5 * (high - low), 0.5 * (low + high)
-    model[:3] += middle * model[3:6]
-    model[6] = unbiased_radius(model[6], min(deviation, 0.5 * model[6]))
-    if len(points) >= FEW:
-        end, width = BEYOND * half, 8.0 * deviation
+    model[POINT] += middle * model[DIRECTION]
+    model[RADIUS] = unbiased_radius(model[RADIUS], min(deviation, 0.5 * model[RADIUS]))
+    if len(points) >= LEAST_POINTS_FOR_OUTLIERS:
+        end, width = FIT_BEYOND_ENDS * half, 8.0 * deviation
         found = fit_mixture(points, model, low=-end, high=end, width=width, deviation=deviation)
         if found is not None:
-            return _Fit(found.model, half, found.covariance, max(found.law.deviation, 1e-9 * float(model[6])))
+            return _Fit(found.model, half, found.covariance, max(found.law.deviation, 1e-9 * float(model[RADIUS])))
     cosines, sines, ones = np.cos(angles[on]), np.sin(angles[on]), np.ones(int(on.sum()))
     rows = np.column_stack([cosines, sines, (heights[on] - middle) * cosines, (heights[on] - middle) * sines, ones])
     try:
@@ -233,7 +242,7 @@ def _likeliest(points: FloatArray, model: FloatArray, deviation: float) -> _Fit 
 
 def _fit_steadily(points: FloatArray, model: FloatArray) -> tuple[FloatArray, float] | None:
     """Fit with a width that stays as it is: of few points one that adapts would pick those that agree by chance."""
-    away = np.median(np.abs(cylinder_coordinates(points, model[:3], model[3:6])[1] - model[6]))
+    away = np.median(np.abs(cylinder_coordinates(points, model[POINT], model[DIRECTION])[1] - model[RADIUS]))
     width = max(2.0 * TUKEY * 1.4826 * float(away) * math.sqrt(len(points) / (len(points) - 5.0)), 1e-9)
     schedule = WeightSchedule(width, width, 1.0, math.inf, 1e-6)
     fit = fit_robustly(points, model, low=-math.inf, high=math.inf, schedule=schedule, steps=100)
@@ -243,24 +252,24 @@ def _fit_steadily(points: FloatArray, model: FloatArray) -> tuple[FloatArray, fl
 def _check_determined(fit: _Fit, place: str) -> None:
     """Refuse a cylinder that the points do not tell from a plane, or whose direction they do not tell."""
     model, covariance = fit.model, fit.covariance
-    if not model[6] > CURVED * fit.deviation:
+    if not model[RADIUS] > CURVED_IN_DEVIATIONS * fit.deviation:
         raise InputError(place, "the points scatter as widely as a cylinder through them is thick", _REMEDY)
-    if not model[6] > CURVED * math.sqrt(covariance[4, 4]):
+    if not model[RADIUS] > CURVED_IN_DEVIATIONS * math.sqrt(covariance[4, 4]):
         raise InputError(place, "the points are as flat as their noise", _REMEDY)
-    if not math.sqrt(covariance[2, 2] + covariance[3, 3]) < LOOSEST:
+    if not math.sqrt(covariance[2, 2] + covariance[3, 3]) < LOOSEST_DIRECTION:
         raise InputError(place, "the points do not determine the direction of the axis", _REMEDY)
 
 
 def _outcome(points: FloatArray, fit: _Fit, origin: FloatArray, scale: float, place: str) -> CylinderFit:
     """Put a fit into scene units, and measure the points on it."""
     model = fit.model
-    shape = Cylinder(model[:3], model[3:6], float(model[6]), 2.0 * fit.half).moved(origin, scale)
+    shape = Cylinder(model[POINT], model[DIRECTION], float(model[RADIUS]), 2.0 * fit.half).moved(origin, scale)
     heights, distances, angles = cylinder_coordinates(points, shape.point, shape.direction)
     residuals = distances - shape.radius
     # of numbers far from zero the last digits are missing
     deviation = scale * fit.deviation + 4.0 * float(np.spacing(np.abs(points).max()))
-    on = (np.abs(residuals) < 3.0 * deviation) & (np.abs(heights) <= 0.5 * BEYOND * shape.height)
-    if on.mean() < LEAST_SHARE:
+    on = (np.abs(residuals) < 3.0 * deviation) & (np.abs(heights) <= 0.5 * FIT_BEYOND_ENDS * shape.height)
+    if on.mean() < LEAST_SHARE_ON_CYLINDER:
         raise InputError(place, f"only {100 * on.mean():.0f} % of the points lie on one cylinder", _REMEDY)
     units = np.array([scale, scale, 1.0, 1.0, scale])
     covariance = fit.covariance * np.outer(units, units)

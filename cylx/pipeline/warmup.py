@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.geometry.cells import Cells
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
 from cylx.geometry.morton import find_cell, morton_codes
 from cylx.pipeline.assembly import assemble
 from cylx.pipeline.candidates import candidates_of_windows
@@ -108,9 +109,9 @@ def _practice_candidates(frame: Frame) -> Candidates:
     """Give candidates of the two cylinders of the practice cloud."""
     rng = np.random.default_rng(1)
     models = np.empty((60, 7))
-    models[:, :3] = np.column_stack([4.0 * (np.arange(60) % 2), np.zeros(60), 4.0 * rng.random(60)])
-    models[:, :3] = (models[:, :3] - frame.origin) / frame.spacing
-    models[:, 3:6] = np.array([0.0, 0.0, 1.0]) + 0.002 * rng.standard_normal((60, 3))
-    models[:, 3:6] /= np.linalg.norm(models[:, 3:6], axis=1, keepdims=True)
-    models[:, 6] = (1.0 + 0.002 * rng.standard_normal(60)) / frame.spacing
+    models[:, POINT] = np.column_stack([4.0 * (np.arange(60) % 2), np.zeros(60), 4.0 * rng.random(60)])
+    models[:, POINT] = (models[:, POINT] - frame.origin) / frame.spacing
+    models[:, DIRECTION] = np.array([0.0, 0.0, 1.0]) + 0.002 * rng.standard_normal((60, 3))
+    models[:, DIRECTION] /= np.linalg.norm(models[:, DIRECTION], axis=1, keepdims=True)
+    models[:, RADIUS] = (1.0 + 0.002 * rng.standard_normal(60)) / frame.spacing
     return Candidates(models, np.arange(60), np.full(60, 5.0), np.full(60, 100), np.full(60, 5.0))

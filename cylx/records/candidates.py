@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
 from cylx.geometry.ellipse import Ellipse
 from cylx.geometry.plane import Plane
 
@@ -80,17 +81,17 @@ class Candidates:
     @property
     def points(self) -> FloatArray:
         """Points of the axes, shape (M, 3)."""
-        return self.models[:, 0:3]
+        return self.models[:, POINT]
 
     @property
     def directions(self) -> FloatArray:
         """Unit directions, shape (M, 3)."""
-        return self.models[:, 3:6]
+        return self.models[:, DIRECTION]
 
     @property
     def radii(self) -> FloatArray:
         """Radii, shape (M,)."""
-        return self.models[:, 6]
+        return self.models[:, RADIUS]
 
     def take(self, which: IndexArray | MaskArray) -> Candidates:
         """Give the candidates at these indices, or under this mask."""

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cylx.geometry.bounding_box import extent_of
 from cylx.geometry.cells import Cells
-from cylx.geometry.cylinder import Cylinder
+from cylx.geometry.cylinder import POINT, RADIUS, UX, UY, UZ, Cylinder
 from cylx.geometry.numerics import sort_in_place
 from cylx.records.sources import ARRAY, Source
 
@@ -265,11 +265,11 @@ class IndexedCloud:
         Its own patches of surface say whether it is noisier than usual: a camera sees steep sides less exactly than the
         floor. Patches that are not small against the cylinder show its curvature rather than noise.
         """
-        radius = float(model[6])
+        radius = float(model[RADIUS])
         usual = self.noise.at(2.0 * radius)
         own, count = _noise_on(self.noise.patches, model, half, max(0.1 * radius, 4.0 * usual))
         if count < ENOUGH_PATCHES:
-            return usual * max(1.0, float(self.noise.factors_at(model[None, :3])[0]))
+            return usual * max(1.0, float(self.noise.factors_at(model[None, POINT])[0]))
         return usual * min(own, MOST_NOISE) if own > 1.2 else usual
 
     def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
@@ -286,14 +286,14 @@ def _noise_on(patches: FloatArray, model: FloatArray, half: float, width: float)
     """Give the median noise of the patches on a cylinder's surface that are small against it, and their number."""
     values, n = np.empty(len(patches)), np.int64(0)
     for i in range(len(patches)):
-        if patches[i, 3] * SMALL_PATCH >= model[6]:
+        if patches[i, 3] * SMALL_PATCH >= model[RADIUS]:
             continue
         dx, dy, dz = patches[i, 0] - model[0], patches[i, 1] - model[1], patches[i, 2] - model[2]
-        height = dx * model[3] + dy * model[4] + dz * model[5]
+        height = dx * model[UX] + dy * model[UY] + dz * model[UZ]
         if abs(height) >= half:
             continue
         distance = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height))
-        if abs(distance - model[6]) < width:
+        if abs(distance - model[RADIUS]) < width:
             values[n] = patches[i, 4]
             n += 1
     if n == 0:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.fits.nominal_radius import Choice, Decision
-from cylx.geometry.cylinder import Cylinder
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, Cylinder
 from cylx.records.clouds import PointCloud, Scene
 from cylx.records.progress import StageReport
 from cylx.records.shown import html_in_notebook
@@ -49,9 +49,24 @@ class Segment:
     choice: Choice | None = None
 
     @property
+    def point(self) -> FloatArray:
+        """Middle of the axis, shape (3,)."""
+        return self.model[POINT]
+
+    @property
+    def direction(self) -> FloatArray:
+        """Unit direction of the axis, shape (3,)."""
+        return self.model[DIRECTION]
+
+    @property
+    def radius(self) -> float:
+        """Radius, frame units."""
+        return float(self.model[RADIUS])
+
+    @property
     def cylinder(self) -> Cylinder:
         """The shape, in the frame."""
-        return Cylinder(self.model[:3], self.model[3:6], float(self.model[6]), 2.0 * self.half)
+        return Cylinder(self.point, self.direction, self.radius, 2.0 * self.half)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

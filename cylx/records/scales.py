@@ -16,7 +16,7 @@ IndexArray = NDArray[np.int64]
 MaskArray = NDArray[np.bool_]
 
 
-BLOCK = 2
+LEVELS_TO_BLOCK = 2
 """Levels from a voxel to the block of voxels that tells how many points one should have."""
 SLIVER = 8
 """A voxel with so many times fewer points than the fullest one of its block is one that a surface hardly touches."""
@@ -110,7 +110,7 @@ def _without_slivers(members: IndexArray, voxels: IndexArray, runs: IndexArray) 
     Where a surface runs along the faces of voxels, the few points that noise has moved across a face have voxels of
     their own. With one point of each voxel they would have as great a say as all the others, and bend the surface.
     """
-    counts, blocks = np.diff(runs), voxels >> (3 * BLOCK)
+    counts, blocks = np.diff(runs), voxels >> (3 * LEVELS_TO_BLOCK)
     starts = np.flatnonzero(np.diff(blocks, prepend=-1))
     fullest = np.repeat(np.maximum.reduceat(counts, starts), np.diff(starts, append=len(blocks)))
     kept = SLIVER * counts >= fullest

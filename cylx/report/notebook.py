@@ -33,9 +33,9 @@ MOST_CYLINDERS = 500
 """Cylinders in the view; each takes about a kilobyte."""
 MOST_CELLS = 200_000
 """Of the maps of all cylinders together."""
-ENOUGH = 1_000_000
+ENOUGH_TO_CHOOSE_FROM = 1_000_000
 """Points that are looked at; of larger clouds an even choice."""
-HEIGHT = 520
+VIEW_HEIGHT = 520
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ def show(
     cloud: PointCloud | ArrayLike | None = None,
     *,
     most_points: int = MOST_POINTS,
-    height: int = HEIGHT,
+    height: int = VIEW_HEIGHT,
 ) -> NotebookView:
     """Show a result in a notebook: a table of its cylinders, and a view in 3-D to turn and to click on.
 
@@ -99,7 +99,7 @@ def show(
     text = repr(found)
     parts = [f"<div><strong>{_text(text)}</strong></div>", _table(result)]
     if len(view.points) or view.shapes:
-        page = page_of(_glance(result, view.thinned(max(ENOUGH, most_points)), most_points))
+        page = page_of(_glance(result, view.thinned(max(ENOUGH_TO_CHOOSE_FROM, most_points)), most_points))
         style = f"width: 100%; height: {int(height)}px; border: 0"
         frame = f"<iframe sandbox='allow-scripts' title='the cylinders in 3-D' style='{style}'"
         parts.append(f"{frame} srcdoc='{escape(page)}'></iframe>")

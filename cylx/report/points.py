@@ -12,9 +12,9 @@ from cylx.records import PointCloud
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-STEPS = 65535
+STEPS_ACROSS_BOX = 65535
 """Steps of a coordinate across the box that is shown."""
-LEAST = 200
+LEAST_OF_EACH_CYLINDER = 200
 """Points each cylinder keeps if it has them, however many there are beside it."""
 NO_RESIDUAL = -128
 
@@ -52,7 +52,7 @@ def choose_points(labels: NDArray[np.int32], most: int, rng: np.random.Generator
 
 def _quotas(counts: IndexArray, most: int) -> IndexArray:
     """Share the points that may be shown out: a few to everybody, the rest by size."""
-    least = np.minimum(counts, min(LEAST, most // (2 * len(counts))))
+    least = np.minimum(counts, min(LEAST_OF_EACH_CYLINDER, most // (2 * len(counts))))
     rest = counts - least
     return np.asarray(least + rest * (most - least.sum()) // rest.sum(), dtype=np.int64)
 
@@ -74,7 +74,7 @@ def quantise(points: FloatArray) -> tuple[NDArray[np.uint16], FloatArray, FloatA
     """
     low = points.min(axis=0)
     size = points.max(axis=0) - low
-    steps = np.rint((points - low) * (STEPS / np.where(size > 0, size, 1.0)))
+    steps = np.rint((points - low) * (STEPS_ACROSS_BOX / np.where(size > 0, size, 1.0)))
     return steps.astype("<u2"), low, size
 
 

@@ -12,11 +12,11 @@ from cylx.records import PointCloud, Scene
 
 FloatArray = NDArray[np.float64]
 
-SAMPLE = 100_000
+COORDINATES_SAMPLED = 100_000
 """Coordinates that are looked at for the steps they are stored in."""
 ROUNDING = 12.0**-0.5
 """Standard deviation of what is rounded to steps of 1."""
-ENOUGH = 10
+LEAST_GAPS = 10
 """Fewer gaps than this between coordinates say nothing of a step."""
 CROWDED = 8
 """So many points to each value that there is: the values are levels."""
@@ -24,11 +24,11 @@ KEYS = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
 """Odd numbers without a pattern, which make one number of three coordinates."""
 COPIES = 0.2
 """Share of points that are copies of others, from which on the spacing comes out a tenth too small, or more."""
-GAP = 5.0
+STRAY_DISTANCE = 5.0
 """Strays are this many times as far out as all others."""
 MOST_STRAYS = 0.2
 """Of more points than this, it is not clear which are the strays."""
-FLAT = 5.0
+FLAT_WITHIN = 5.0
 """Points within so many standard deviations of their noise lie on one plane."""
 SLENDER = 1000.0
 """Scans of degrees beside metres are this many times as high as they are wide."""
@@ -86,7 +86,7 @@ def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
     scene : Scene
         Its spacing and noise, as measured or given.
     """
-    points = cloud.points[:: max(1, len(cloud.points) // SAMPLE)]
+    points = cloud.points[:: max(1, len(cloud.points) // COORDINATES_SAMPLED)]
     steps = [step_of(points[:, d]) for d in range(3)]
     coarse = _coarse(points, steps, scene)
     found = [coarse, None if coarse else _copies(cloud.points, min(steps), scene), _noisy(scene)]
@@ -121,7 +121,7 @@ def step_of(values: FloatArray) -> float:
         rounding, single = 4.0 * float(np.spacing(np.float32(largest))), _single_step(values)
     gaps = np.diff(levels)
     apart = gaps[gaps > rounding]
-    if len(apart) < ENOUGH:
+    if len(apart) < LEAST_GAPS:
         return single
     step = float(apart.min())
     multiples = apart / step
@@ -163,7 +163,7 @@ def _copies(points: FloatArray, step: float, scene: Scene) -> Caution | None:
         keys += (points[:, d] + 0.0).view(np.uint64)  # so that there is one zero
         keys *= np.uint64(factor)
         keys ^= keys >> np.uint64(29)
-    some = np.sort(keys[keys % np.uint64(max(1, len(keys) // SAMPLE)) == 0])
+    some = np.sort(keys[keys % np.uint64(max(1, len(keys) // COORDINATES_SAMPLED)) == 0])
     share = np.count_nonzero(some[1:] == some[:-1]) / max(len(some), 1)
     if share <= COPIES + (step / scene.spacing) ** 2:  # in cells as wide as a step, some points meet by chance
         return None
@@ -205,7 +205,7 @@ def _strays(points: FloatArray) -> Caution | None:
     out = np.sort(np.abs(points - middle).max(axis=1))
     first = int((1.0 - MOST_STRAYS) * len(out))
     tail = out[max(first, 1) :]
-    apart = np.flatnonzero(tail[1:] > GAP * tail[:-1])
+    apart = np.flatnonzero(tail[1:] > STRAY_DISTANCE * tail[:-1])
     if not len(apart) or tail[0] == 0:
         return None
     last = float(tail[apart[0]])
@@ -225,9 +225,9 @@ def _flat(points: FloatArray, scene: Scene) -> Caution | None:
     offsets = points - points.mean(axis=0)
     _, axes = np.linalg.eigh(offsets.T @ offsets)
     heights = np.abs(offsets @ axes[:, 0])
-    if float(np.quantile(heights, 0.999)) > FLAT * scene.noise:
+    if float(np.quantile(heights, 0.999)) > FLAT_WITHIN * scene.noise:
         return None
-    fault = f"all points lie within {FLAT * scene.noise:.3g} of one plane, as its noise is"
+    fault = f"all points lie within {FLAT_WITHIN * scene.noise:.3g} of one plane, as its noise is"
     return Caution("flat", fault, "there is no cylinder in it to be found; scan what stands out")
 
 

@@ -17,7 +17,7 @@ from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mod
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-SAMPLE = 3000
+NEIGHBOURHOODS_SAMPLED = 3000
 """Neighbourhoods looked at; the mode of their noise then scatters by about 4 %."""
 NEIGHBOURS = (48, 96, 192)
 """Sizes of a neighbourhood: the next is taken where the patch is not wide against its thickness."""
@@ -25,11 +25,11 @@ THICK = (384, 768, 1536, 3072, 6144)
 """Sizes that are tried of a cloud whose noise is so many spacings that few of the patches are wide."""
 FEW_WIDE = 0.2
 """Share of the patches below which that is so. Larger ones are tried until half of them are wide."""
-PIECES = 8
+POINTS_PER_PATCH_POINT = 8
 """A patch of more than one point of so many is no longer a small piece."""
-WIDE = 4.0
+WIDE_PATCH = 4.0
 """A patch is wide if its in-plane rms exceeds its thickness this many times."""
-FLAT = 8.0
+WIDE_FOR_ITS_PLACE = 8.0
 """A patch says something of the noise of its place if it is wide this many times, and half as many across: what is
 thicker may be no surface."""
 
@@ -74,7 +74,7 @@ def measure_surface(
     patches : Patches
         Where what was measured.
     """
-    sample = np.sort(rng.choice(len(points), min(SAMPLE, len(points)), replace=False))
+    sample = np.sort(rng.choice(len(points), min(NEIGHBOURHOODS_SAMPLED, len(points)), replace=False))
     level = 0
     while level < BITS and len(codes) < 24 * np.count_nonzero(np.diff(codes >> (3 * level))) + 24:
         level += 1
@@ -88,7 +88,9 @@ def measure_surface(
     for count in NEIGHBOURS + THICK:
         todo = np.flatnonzero(np.isnan(spread))
         size = min(count, len(points) - 1)
-        if len(todo) == 0 or (count in THICK and (len(sample) - len(todo) > enough or PIECES * count > len(points))):
+        if len(todo) == 0 or (
+            count in THICK and (len(sample) - len(todo) > enough or POINTS_PER_PATCH_POINT * count > len(points))
+        ):
             break
         if count in THICK:  # larger ones are fewer: each costs as much more
             todo = np.arange(0, len(sample), 3 * count // THICK[0])
@@ -97,11 +99,11 @@ def measure_surface(
             continue
         near, radius = _nearest(points, cells, starts, unit * 2.0**level, sample[todo], size, threads)
         sd, width, narrow = quadric_spread(points[near])
-        wide = width > WIDE * sd
+        wide = width > WIDE_PATCH * sd
         if count in THICK:
             thickness, spread[:] = float(np.median(sd)), np.nan  # of smaller patches only the thinnest are wide
         spread[todo[wide]] = sd[wide]
-        flat[todo[wide]] = (width > FLAT * sd)[wide] & (narrow > 0.5 * FLAT * sd)[wide]
+        flat[todo[wide]] = (width > WIDE_FOR_ITS_PLACE * sd)[wide] & (narrow > 0.5 * WIDE_FOR_ITS_PLACE * sd)[wide]
         size_of[todo[wide]] = radius[wide]
         third = np.flatnonzero(wide)[::3] if wide.any() else np.arange(0, len(todo), 3)
         deviation[todo[third]] = core_spread(points[near[third]])

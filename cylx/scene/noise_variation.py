@@ -15,11 +15,11 @@ from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mod
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-MOST = 8.0
+MOST_NOISE_FACTOR = 8.0
 """No place is taken for this many times noisier than usual: what scatters more is no surface."""
 AGREED = 16
 """Patches that a cell needs to say something of its own noise."""
-PIECES, PATCH = 600, 64
+LARGE_PIECES, POINTS_OF_PIECE = 600, 64
 """Larger pieces looked at, and the points of each."""
 
 
@@ -62,7 +62,7 @@ def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tup
         mode = half_sample_mode(own)
         known[c] = (np.abs(np.log(own / mode)) < 0.3).mean() >= 0.6
         # what is less may be the scatter of the estimate; and a quiet floor says nothing of what stands on it
-        factors[c] = min(mode, MOST) if known[c] and mode > 1.3 else 1.0
+        factors[c] = min(mode, MOST_NOISE_FACTOR) if known[c] and mode > 1.3 else 1.0
     if not (factors != 1.0).any():
         return side, *none
     return side, cells[known], factors[known]
@@ -83,7 +83,7 @@ def noise_by_size(
     size.
     """
     larger = [8.0 * spacing, 16.0 * spacing, 32.0 * spacing, 64.0 * spacing]
-    samples = [np.sort(rng.choice(len(points), min(PIECES, len(points)), replace=False)) for _ in larger]
+    samples = [np.sort(rng.choice(len(points), min(LARGE_PIECES, len(points)), replace=False)) for _ in larger]
 
     def work(size: float, sample: IndexArray) -> float | None:
         return _noise_of_flat(points, codes, unit, size, sample, 1e-12 * spacing)
@@ -107,7 +107,7 @@ def _noise_of_flat(
     """Give the noise over the flat ones of pieces of a size; None if there are few of them, or they do not agree."""
     level = min(BITS, max(0, math.floor(math.log2(size / unit))))
     cells, starts = cell_starts(codes, level)
-    patches = np.empty((len(sample), PATCH, 3))
+    patches = np.empty((len(sample), POINTS_OF_PIECE, 3))
     full = np.zeros(len(sample), np.bool_)
     _fill_patches(points, cells, starts, unit * 2.0**level, sample, size, patches, full)
     if full.mean() < 0.5:
@@ -116,7 +116,9 @@ def _noise_of_flat(
     sd, width, _ = quadric_spread(patches)
     value = np.maximum(np.minimum(sd, core_spread(patches) / MAD_SHRINKAGE), least)
     offsets = patches - patches.mean(axis=1, keepdims=True)
-    thickness = np.sqrt(np.maximum(np.linalg.eigvalsh(offsets.transpose(0, 2, 1) @ offsets)[:, 0], 0.0) / PATCH)
+    thickness = np.sqrt(
+        np.maximum(np.linalg.eigvalsh(offsets.transpose(0, 2, 1) @ offsets)[:, 0], 0.0) / POINTS_OF_PIECE
+    )
     flat = (value < width / 8.0) & (thickness < 2.0 * value)
     if flat.sum() < max(20, 0.15 * len(flat)):
         return None

@@ -23,10 +23,10 @@ def out_of_range(segment: Segment, radii: tuple[float, float], scene: SceneConfi
         Least and greatest radius, frame units.
     scene : SceneConfig
     """
-    if not radii[0] <= segment.model[6] <= radii[1]:
+    if not radii[0] <= segment.radius <= radii[1]:
         return "radius out of range"
     tolerance = math.radians(scene.axis_tolerance_deg)
-    astray = scene.axis is not None and not are_along(segment.model[3:6], scene.axis, tolerance)
+    astray = scene.axis is not None and not are_along(segment.direction, scene.axis, tolerance)
     return "axis out of range" if astray else ""
 
 

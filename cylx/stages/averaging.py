@@ -18,8 +18,8 @@ from cylx.config import AveragingConfig
 from cylx.fits.conditioning import given_radius
 from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.fits.nominal_radius import Catalogue, choose_entry
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder, unbiased_radius
-from cylx.geometry.cylinder import cylinder_coordinates, points_on
+from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder, unbiased_radius
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, cylinder_coordinates, points_on
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Segment
@@ -28,23 +28,21 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
 GROWTH_STEPS = 8
-DOUBT = 0.4
+DOUBT_INSIDE = 0.4
 """A piece of the height that was found to belong before is asked for this share of what one beyond the ends is."""
-DOUBTFUL, WIDE = 0.75, 5.0
+STRICT_FLATNESS, STRICT_FROM_RADIUS = 0.75, 5.0
 """While a cylinder grows, points in flat windows of this share of what is too flat are left out, too, so that it does
 not follow what it touches, such as the floor under a can; but if its radius is fewer spacings than these, the strip
 that is seen of it may be flat itself."""
-ROUGH = 0.02
+ROUGH_TOLERANCE = 0.02
 """While a cylinder grows, a fit may end at steps of this share of the spread."""
-ENOUGH = 6000
+ENOUGH_TO_GROW = 6000
 """Points that suffice while a cylinder grows."""
-MANY = 20000
+ENOUGH_TO_JUDGE = 20000
 """Points that suffice to judge it; the last fit takes all."""
-BEYOND = 1.02
-"""A fit goes this much further than the ends: the outermost points lie on them, and rounding would choose."""
-STRUCTURED = 1.4
+STRUCTURED_LACK_OF_FIT = 1.4
 """A lack of fit (chi-square per cell) beyond this is none by chance."""
-SURE = 8.0
+WIDEST_IN_LAST_FIT = 8.0
 """Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
 LEAST_COSINE = math.cos(math.radians(25.0))
 """A fit whose axis turns further than this has left the candidates it came from."""
@@ -108,36 +106,39 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
     noise = indexed.noise_about(model, half)
     first = model
     for step in range(GROWTH_STEPS):
-        beyond = max(1.5 * model[6], 0.7 * half) if step else 0.5 * model[6]
-        shell = max(0.12 * model[6] if step == 0 else 0.05 * model[6], 5.0 * noise)
+        beyond = max(1.5 * model[RADIUS], 0.7 * half) if step else 0.5 * model[RADIUS]
+        shell = max(0.12 * model[RADIUS] if step == 0 else 0.05 * model[RADIUS], 5.0 * noise)
         width = shell + 8.0 * noise
-        strict = DOUBTFUL if model[6] > WIDE else 1.0
-        points = _own_points(indexed, model, half + beyond, width, MANY, strict)
+        strict = STRICT_FLATNESS if model[RADIUS] > STRICT_FROM_RADIUS else 1.0
+        points = _own_points(indexed, model, half + beyond, width, ENOUGH_TO_JUDGE, strict)
         if len(points) < 20:
             return "too few points"
-        stride = max(1, len(points) // ENOUGH)
-        schedule = WeightSchedule(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH)
-        end = BEYOND * half
+        stride = max(1, len(points) // ENOUGH_TO_GROW)
+        schedule = WeightSchedule(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH_TOLERANCE)
+        end = FIT_BEYOND_ENDS * half
         fit = fit_cylinder(points[::stride], model, low=-end, high=end, schedule=schedule, steps=12 if step else 25)
         if fit is None:
             return "no fit"
         model, spread = fit
-        if not (0.5 * first[6] <= model[6] <= 2.0 * first[6]) or abs(model[3:6] @ first[3:6]) < LEAST_COSINE:
+        if (
+            not (0.5 * first[RADIUS] <= model[RADIUS] <= 2.0 * first[RADIUS])
+            or abs(model[DIRECTION] @ first[DIRECTION]) < LEAST_COSINE
+        ):
             return "drifted away"
         spread = TUKEY_SPREAD * spread
         heights, angles = points_on(points, model, 3.0 * min(max(spread, noise), 2.0 * noise))
-        found = visible_extent(heights, angles, half, model[6], doubt=DOUBT if step else 1.0)
+        found = visible_extent(heights, angles, half, model[RADIUS], doubt=DOUBT_INSIDE if step else 1.0)
         if found is None:
             return "too few points"
         low, high = found
         before = half
         half = 0.5 * (high - low)
-        model[:3] += 0.5 * (low + high) * model[3:6]
-        if half < 0.1 * model[6]:
+        model[POINT] += 0.5 * (low + high) * model[DIRECTION]
+        if half < 0.1 * model[RADIUS]:
             return "too short"
-        if step and abs(half - before) < 0.01 * before + 0.01 * model[6]:
+        if step and abs(half - before) < 0.01 * before + 0.01 * model[RADIUS]:
             break
-    return refit(Segment(model, half, noise), indexed, most=MANY)
+    return refit(Segment(model, half, noise), indexed, most=ENOUGH_TO_JUDGE)
 
 
 def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> Segment | str:
@@ -159,7 +160,7 @@ def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> S
     if fit is None:
         return "no fit"
     model, spread = fit
-    model[6] = unbiased_radius(model[6], min(spread, 0.5 * model[6]))
+    model[RADIUS] = unbiased_radius(model[RADIUS], min(spread, 0.5 * model[RADIUS]))
     return Segment(model, segment.half, spread)
 
 
@@ -170,7 +171,7 @@ def inflation(measures: Mapping[str, float]) -> float:
     neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
     """
     lack = measures.get("lack_of_fit", 1.0)
-    return lack if lack > STRUCTURED else 1.0
+    return lack if lack > STRUCTURED_LACK_OF_FIT else 1.0
 
 
 def finish(
@@ -205,13 +206,21 @@ def finish(
         is none.
     """
     points, width = _shell(segment, indexed, None)
-    fit = _robust_fit(points, width, segment, indexed, steps=15, tolerance=ROUGH)
+    fit = _robust_fit(points, width, segment, indexed, steps=15, tolerance=ROUGH_TOLERANCE)
     if fit is None:
         return "no fit"
     model, spread = fit
     _turn_as_given(model)
-    end, deviation = BEYOND * segment.half, max(spread, 1e-9 * model[6])  # points may lie on the surface exactly
-    limits = {"low": -end, "high": end, "width": min(SURE * deviation, 2.0 * width), "deviation": deviation}
+    end, deviation = (
+        FIT_BEYOND_ENDS * segment.half,
+        max(spread, 1e-9 * model[RADIUS]),
+    )  # points may lie on the surface exactly
+    limits = {
+        "low": -end,
+        "high": end,
+        "width": min(WIDEST_IN_LAST_FIT * deviation, 2.0 * width),
+        "deviation": deviation,
+    }
     likely = fit_mixture(points, model, **limits)
     if likely is None:
         return refit(segment, indexed)
@@ -228,7 +237,7 @@ def finish(
         free = Segment(likely.model, segment.half, spread, likely.covariance)
     if catalogue is None:
         return free
-    choice = choose_entry(float(free.model[6]), math.sqrt(inflated * likely.covariance[4, 4]), catalogue)
+    choice = choose_entry(free.radius, math.sqrt(inflated * likely.covariance[4, 4]), catalogue)
     if choice.decision != "snapped":
         return replace(free, choice=choice)
     nominal = catalogue.radii[choice.entry]
@@ -246,20 +255,21 @@ def finish(
 
 def _turn_as_given(model: FloatArray) -> None:
     """Turn the direction of a model as the result has it, which the covariance goes by: its largest part positive."""
-    model[3:6] *= np.sign(model[3 + int(np.abs(model[3:6]).argmax())])
+    direction = model[DIRECTION]
+    direction *= np.sign(direction[np.abs(direction).argmax()])
 
 
 def _shell(segment: Segment, indexed: IndexedCloud, most: int | None) -> tuple[FloatArray, float]:
     """Give the points about the surface of a segment, and how near to it those lie that have a say at first."""
-    width = max(4.0 * indexed.noise_about(segment.model, segment.half), 0.02 * segment.model[6])
-    return _own_points(indexed, segment.model, BEYOND * segment.half, 2.0 * width, most), width
+    width = max(4.0 * indexed.noise_about(segment.model, segment.half), 0.02 * segment.radius)
+    return _own_points(indexed, segment.model, FIT_BEYOND_ENDS * segment.half, 2.0 * width, most), width
 
 
 def _robust_fit(
     points: FloatArray, width: float, segment: Segment, indexed: IndexedCloud, *, steps: int, tolerance: float = 1e-9
 ) -> tuple[FloatArray, float] | None:
     """Fit a cylinder to the points of a segment; give it and the standard deviation about it."""
-    noise, end = indexed.noise_about(segment.model, segment.half), BEYOND * segment.half
+    noise, end = indexed.noise_about(segment.model, segment.half), FIT_BEYOND_ENDS * segment.half
     schedule = WeightSchedule(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, tolerance)
     if len(points) < 20:
         return None
@@ -280,7 +290,7 @@ def measure_extent(segment: Segment, indexed: IndexedCloud) -> Segment | str:
     Segment or str
         The same axis and radius with its own middle, height and spread, or why there is none.
     """
-    model, radius = segment.model, float(segment.model[6])
+    model, radius = segment.model, segment.radius
     reach = max(segment.half, radius) * 4.0
     # the average is as good as its candidates, so its surface is looked for in a wider shell than a fitted one's
     width = max(5.0 * indexed.noise_about(model, segment.half), 0.05 * radius)
@@ -290,7 +300,7 @@ def measure_extent(segment: Segment, indexed: IndexedCloud) -> Segment | str:
     for _ in range(GROWTH_STEPS):
         near = indexed.cells.near_cylinder(model, -reach, reach, max(0.0, radius - width), radius + width)
         near = near[indexed.may_be_on(near, radius)]
-        heights, distances, angles = cylinder_coordinates(indexed.points[near], model[:3], model[3:6])
+        heights, distances, angles = cylinder_coordinates(indexed.points[near], model[POINT], model[DIRECTION])
         found = visible_extent(heights, angles, half, radius)
         if found is None:
             return "too few points"
@@ -302,7 +312,7 @@ def measure_extent(segment: Segment, indexed: IndexedCloud) -> Segment | str:
         return "too short"
     on = (heights >= low) & (heights <= high)
     spread = 1.4826 * float(np.median(np.abs(distances[on] - radius)))
-    moved = np.concatenate([model[:3] + 0.5 * (low + high) * model[3:6], model[3:]])
+    moved = np.concatenate([model[POINT] + 0.5 * (low + high) * model[DIRECTION], model[3:]])
     return Segment(moved, 0.5 * (high - low), spread)
 
 
@@ -310,4 +320,6 @@ def _own_points(
     indexed: IndexedCloud, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
 ) -> FloatArray:
     """Give the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
-    return indexed.cells.surface_points(model, half, width, most, indexed.flatness, strict * indexed.too_flat(model[6]))
+    return indexed.cells.surface_points(
+        model, half, width, most, indexed.flatness, strict * indexed.too_flat(model[RADIUS])
+    )

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
+from cylx.geometry.cylinder import RADIUS
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-CAPACITY = 4096
+MOST_POINTS_TO_POLISH = 4096
 """Most points a candidate is polished on."""
 
 
@@ -126,11 +127,11 @@ def _polish(
     rows: FloatArray,
     kept: NDArray[np.bool_],
 ) -> None:
-    found, around = np.empty(CAPACITY, np.int64), np.empty((3, CAPACITY))
+    found, around = np.empty(MOST_POINTS_TO_POLISH, np.int64), np.empty((3, MOST_POINTS_TO_POLISH))
     quality, center = np.empty(3), np.empty(3)
     for c in range(len(rows)):
         model = rows[c, :7]
-        first = model[6]
+        first = model[RADIUS]
         for d in range(3):
             center[d] = model[d]
             model[d] = 0.0

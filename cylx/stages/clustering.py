@@ -20,13 +20,13 @@ from cylx.records import Candidates, Cluster, Segment, StageReport
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-MEMBER = 0.35
+LEAST_SHARE_OF_MEMBER = 0.35
 """Everybody whose payoff against the equilibrium exceeds this share of the mean belongs to the cluster."""
-CROWD = 400
+MOST_CANDIDATES_OF_POPULATION = 400
 """Most candidates of a local population, the best connected ones."""
 
 
-PATIENCE = 3
+SMALL_CLUSTERS_TO_END = 3
 """Where all play, this many small clusters in a row end it: the paper says only "until all are extracted"."""
 
 
@@ -48,7 +48,7 @@ class CandidateGame:
         self._places = Neighbourhood(candidates)
         self._dropped = {"too small": 0, "too little payoff": 0}
         self._clusters = 0
-        self._patience = PATIENCE
+        self._patience = SMALL_CLUSTERS_TO_END
         if config.kernel == "screw":
             dense = screw_payoff(candidates.models, candidates.parents, config.screw_scale, config.min_radius_ratio)
             self._payoff = SparsePayoff.of(dense)
@@ -88,7 +88,7 @@ class CandidateGame:
             # the paper's winners are those with a share; here also whoever does well against them
             members = population > (0.0 if not whole else 1.0 / len(nodes) * 1e-3)
             if not whole:
-                members |= fitness > MEMBER * mean
+                members |= fitness > LEAST_SHARE_OF_MEMBER * mean
             self.withdraw(nodes[members])
             support = int(members.sum())
             if support < self._config.min_support:
@@ -96,7 +96,7 @@ class CandidateGame:
             elif mean < self._config.min_payoff:
                 self._dropped["too little payoff"] += 1
             else:
-                self._patience = PATIENCE
+                self._patience = SMALL_CLUSTERS_TO_END
                 self._clusters += 1
                 weights = population[members] + (0.0 if whole else 0.05 * population.max())
                 return Cluster(nodes[members], weights / weights.sum(), mean)
@@ -137,8 +137,8 @@ class CandidateGame:
             columns, values = self._payoff.row(i)
             present = self._alive[columns]
             columns, values = columns[present], values[present]
-            if len(columns) >= CROWD:
-                columns = columns[np.argsort(-values, kind="stable")[: CROWD - 1]]
+            if len(columns) >= MOST_CANDIDATES_OF_POPULATION:
+                columns = columns[np.argsort(-values, kind="stable")[: MOST_CANDIDATES_OF_POPULATION - 1]]
             self._alive[i] = True
             self.withdraw(np.array([i]))
             return np.concatenate(([i], columns)).astype(np.int64)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
+from cylx.geometry.cylinder import RADIUS, UX, UZ
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.numerics import fill_basis
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
@@ -25,17 +26,17 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 MaskArray = NDArray[np.bool_]
 
-CAPACITY = 2048
+MOST_POINTS_OF_WINDOW = 2048
 """Most points of a window; thinned windows over one surface hold about 600."""
 FEW_SEEDS = 3000
-"""Octaves with fewer windows than this get them more closely."""
+"""Scales with fewer windows than this get them more closely."""
 FLAT_SHARE = 0.9
 """Share of a window's points within three noises of its plane that makes it flat."""
 OUTCOMES = ("too few points", "flat", "no curvature", "does not fit", "badly supported", "kept")
-LEAST_POINTS = 25
-LONELY = 4
+LEAST_POINTS_OF_SCALE = 25
+LEAST_POINTS_OF_CELL = 4
 """No window is laid about points that have fewer than this in their cell: most of them are noise."""
-COLUMNS = 9
+WINDOW_COLUMNS = 9
 """Numbers a window fills in: the model (7), inliers, extent."""
 
 
@@ -65,9 +66,9 @@ def find_curved_windows(
     counts = np.zeros(len(OUTCOMES), np.int64)
     for radius in reversed(frame.window_radii(config.octave)):
         scale = Scale.of(frame, radius, explained.flatness == 0)
-        if len(scale.points) < LEAST_POINTS:
+        if len(scale.points) < LEAST_POINTS_OF_SCALE:
             continue
-        seeds = scale.seeds(FEW_SEEDS, least=LONELY)
+        seeds = scale.seeds(FEW_SEEDS, least=LEAST_POINTS_OF_CELL)
         rows, outcome, planes, marks = _look(frame, scale, seeds, radius_range, config, threads)
         counts += np.bincount(outcome, minlength=len(OUTCOMES))
         scale.spread(marks, explained.curved)
@@ -89,7 +90,7 @@ def _look(
     threads: int,
 ) -> tuple[FloatArray, IndexArray, FloatArray, MaskArray]:
     """Look through the windows about all seeds, in chunks over threads."""
-    rows, planes = np.zeros((len(seeds), COLUMNS)), np.zeros((len(seeds), 6))
+    rows, planes = np.zeros((len(seeds), WINDOW_COLUMNS)), np.zeros((len(seeds), 6))
     outcome, marks = np.zeros(len(seeds), np.int64), np.zeros(len(scale.points), np.bool_)
     noises = frame.noise.about(scale.points[seeds], 2.0 * scale.radius)
     chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 64)))
@@ -139,9 +140,9 @@ def _scan(
     planes: FloatArray,
     marks: MaskArray,
 ) -> None:
-    found = np.empty(CAPACITY, np.int64)
-    around, inner = np.empty((3, CAPACITY)), np.empty((3, CAPACITY))
-    plane, local = np.empty((2, 3)), np.empty((4, CAPACITY))
+    found = np.empty(MOST_POINTS_OF_WINDOW, np.int64)
+    around, inner = np.empty((3, MOST_POINTS_OF_WINDOW)), np.empty((3, MOST_POINTS_OF_WINDOW))
+    plane, local = np.empty((2, 3)), np.empty((4, MOST_POINTS_OF_WINDOW))
     matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
     right, axes = np.empty(6), np.empty((2, 3))
     quality = np.empty(3)
@@ -162,7 +163,7 @@ def _scan(
         fit_plane(inner, m, noise, plane[0], plane[1], matrix, vectors)
         if not osculating_cylinder(inner, m, noise, plane[0], plane[1], model, matrix, right, axes, local):
             continue
-        if not (max(0.35 * radius, 4.0 * noise) <= model[6] <= 14.0 * radius):
+        if not (max(0.35 * radius, 4.0 * noise) <= model[RADIUS] <= 14.0 * radius):
             continue
         outcome[s] = 3
         low, high = max(0.3 * radius, 4.0 * noise, least), min(16.0 * radius, greatest)
@@ -209,12 +210,12 @@ def _mark_explained(
     marks: MaskArray,
 ) -> None:
     """Mark the points of a window that lie on its cylinder; threads may mark the same ones, which does no harm."""
-    fill_basis(model[3:6], basis)
+    fill_basis(model[UX : UZ + 1], basis)
     for i in range(n):
         dx, dy, dz = xyz[0, i] - model[0], xyz[1, i] - model[1], xyz[2, i] - model[2]
         x = dx * basis[0, 0] + dy * basis[0, 1] + dz * basis[0, 2]
         y = dx * basis[1, 0] + dy * basis[1, 1] + dz * basis[1, 2]
-        if abs(math.sqrt(x * x + y * y) - model[6]) < width:
+        if abs(math.sqrt(x * x + y * y) - model[RADIUS]) < width:
             marks[found[i]] = True
 
 

@@ -14,27 +14,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
-from cylx.geometry.cylinder import coordinates_of
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
 Judge = Callable[[Segment, Finding], Finding | None]
 
-ROUNDS = 6
-REACH = 0.5
+EXTENSION_ROUNDS = 6
+MOST_AXIS_ERROR = 0.5
 """How uncertain the axis may be, in radii, where points are looked for."""
-FURTHER = 4.0, 12.0, 40.0
+LENGTH_FACTORS = 4.0, 12.0, 40.0
 """How many times longer a cylinder may become in one round; what is near is looked at first, and tells the direction
 of what is far."""
-BEYOND = 10
+LEAST_POINTS_BEYOND_END = 10
 """Fewest points that must be found beyond an end."""
-DENSER = 4.0
+EXTENSION_DENSITY_RATIO = 4.0
 """How much denser they must lie on the surface than beside it."""
-THINNER = 0.25
+SPARSEST_SHARE = 0.25
 """Where there is less than this share of the mean number of points a length, the cylinder has ended."""
-GAP = 0.5
+WIDEST_GAP_SHARE = 0.5
 """Widest gap, as a share of what is added."""
-LESS = 0.1
+MOST_CONFIDENCE_LOST = 0.1
 """How much less confident the longer one may be."""
 
 
@@ -55,8 +55,8 @@ def extend(finding: Finding, indexed: IndexedCloud, judge: Judge) -> Finding:
     Finding
         The longer one, or the same.
     """
-    for _ in range(ROUNDS):
-        judged = next((one for times in FURTHER if (one := _longer(finding, indexed, judge, times))), None)
+    for _ in range(EXTENSION_ROUNDS):
+        judged = next((one for times in LENGTH_FACTORS if (one := _longer(finding, indexed, judge, times))), None)
         if judged is None:
             break
         finding = judged
@@ -67,24 +67,24 @@ def _longer(finding: Finding, indexed: IndexedCloud, judge: Judge, times: float)
     """Give a cylinder with what lies within so many times its length, if it passes as well as before."""
     longer = _lengthened(finding, indexed, times)
     judged = None if longer is None else judge(longer, finding)
-    return judged if judged is not None and judged.confidence >= finding.confidence - LESS else None
+    return judged if judged is not None and judged.confidence >= finding.confidence - MOST_CONFIDENCE_LOST else None
 
 
 def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segment | None:
     """Fit a cylinder to a piece and what lies beyond its ends; None if that is next to nothing."""
     model, half = finding.segment.model, finding.segment.half
     noise = indexed.noise_about(model, half)
-    allowed = (REACH * model[6]) ** 2 - finding.offset_error**2
+    allowed = (MOST_AXIS_ERROR * model[RADIUS]) ** 2 - finding.offset_error**2
     reach = min(math.sqrt(max(allowed, 0.0)) / max(finding.tilt_error, 1e-12), times * half)
-    if reach < half + model[6]:
+    if reach < half + model[RADIUS]:
         return None
-    outer = model[6] + max(0.5 * model[6], 10.0 * noise)
+    outer = model[RADIUS] + max(0.5 * model[RADIUS], 10.0 * noise)
     near = indexed.cells.near_cylinder(model, -reach, reach, 0.0, outer)
-    near = near[indexed.may_be_on(near, model[6])]
+    near = near[indexed.may_be_on(near, model[RADIUS])]
     heights, residuals, _ = coordinates_of(indexed.points, near, model)
     astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
     fresh = (np.abs(heights) > half) & (np.abs(residuals) < 3.0 * noise + 2.0 * astray)
-    if fresh.sum() < BEYOND:
+    if fresh.sum() < LEAST_POINTS_BEYOND_END:
         return None
     points = indexed.points[np.concatenate([finding.points, near[fresh]])]
     shell = max(3.0 * noise, 2.0 * float(astray.max()))
@@ -98,11 +98,12 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
         return None
     heights, residuals, _ = coordinates_of(indexed.points, near, longer)
     on = np.abs(residuals) < 2.0 * noise
-    share = longer[6] * 8.0 * noise / (outer**2 - 8.0 * longer[6] * noise)  # of the areas on and beside the surface
+    area = 8.0 * noise * longer[RADIUS]  # on the surface, over pi
+    share = area / (outer**2 - area)
     low, high = -_end(-heights, on, half, reach, share), _end(heights, on, half, reach, share)
-    if low > -half - longer[6] and high < half + longer[6]:
+    if low > -half - longer[RADIUS] and high < half + longer[RADIUS]:
         return None
-    longer[:3] += 0.5 * (low + high) * longer[3:6]
+    longer[POINT] += 0.5 * (low + high) * longer[DIRECTION]
     return Segment(longer, 0.5 * (high - low), spread)
 
 
@@ -116,17 +117,17 @@ def _end(heights: FloatArray, on: NDArray[np.bool_], half: float, reach: float, 
     past = np.flatnonzero((heights > half) & (heights <= reach))
     past = past[np.argsort(heights[past])]
     along, is_on, end = heights[past], on[past], reach
-    worth = np.where(is_on, 1.0, -DENSER * share)
+    worth = np.where(is_on, 1.0, -EXTENSION_DENSITY_RATIO * share)
     while True:
         count = int(is_on.sum())
-        if count < BEYOND:
+        if count < LEAST_POINTS_BEYOND_END:
             return half
-        total = np.cumsum(worth - THINNER * count / (end - half) * np.diff(along, prepend=half))
+        total = np.cumsum(worth - SPARSEST_SHARE * count / (end - half) * np.diff(along, prepend=half))
         last = int(total.argmax())
-        if total[last] < 0.5 * BEYOND:
+        if total[last] < 0.5 * LEAST_POINTS_BEYOND_END:
             return half
         gaps = np.diff(along[: last + 1][is_on[: last + 1]], prepend=half)
-        wide = np.flatnonzero(gaps > GAP * (along[last] - half))
+        wide = np.flatnonzero(gaps > WIDEST_GAP_SHARE * (along[last] - half))
         kept = last + 1 if len(wide) == 0 else int(np.flatnonzero(is_on)[wide[0]])
         if kept == len(along):
             return float(along[last])

@@ -55,11 +55,11 @@ def surface_points(segment: Segment, indexed: IndexedCloud) -> tuple[IndexArray,
     angles : ndarray of shape (n,)
         About the axis, in (-pi, pi].
     """
-    radius = segment.model[6]
+    radius = segment.radius
     reach = 3.0 * max(segment.spread, indexed.noise_about(segment.model, segment.half))
     near = indexed.cells.near_cylinder(
         segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
     )
     near = near[indexed.may_be_on(near, radius)]
-    _, distances, angles = cylinder_coordinates(indexed.points[near], segment.model[:3], segment.model[3:6])
+    _, distances, angles = cylinder_coordinates(indexed.points[near], segment.point, segment.direction)
     return near, distances - radius, angles

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from cylx.config import SlicingConfig
 from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.circle import search_circle
+from cylx.geometry.cylinder import RADIUS, UX
 from cylx.geometry.ellipse import conic_shape, search_conic
 from cylx.geometry.lines import fit_line, off_line
 from cylx.geometry.morton import gather_ball
@@ -26,15 +27,15 @@ from cylx.records import Candidates, Explained, Frame, Scale
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
 
-CAPACITY = 2048
+MOST_POINTS_OF_WINDOW = 2048
 """Most points of a window."""
 SAMPLES = 48
 """Samples of five points a slice."""
-THICKNESS = 0.15
+HALF_THICKNESS = 0.15
 """Half thickness of a slice in radii of its window."""
 SLIM = 0.4
 """A window's points are elongated if they scatter less than this share of their length about their line."""
-FEWEST = 15
+LEAST_POINTS_OF_SLICE = 15
 """Points without which nothing is tried in a window."""
 COUNTS = ("slices", "too few points", "no ellipse", "does not fit")
 
@@ -77,7 +78,7 @@ def slice_windows(
     totals = np.zeros(len(COUNTS), np.int64)
     for radius in reversed(frame.window_radii(octave_ratio)):
         scale = Scale.of(frame, radius, explained.flatness == 0)
-        if len(scale.points) < FEWEST:
+        if len(scale.points) < LEAST_POINTS_OF_SLICE:
             continue
         open_points = ~explained.curved[scale.indices]
         seeds = scale.seeds(config.windows // 2, open_points)
@@ -155,15 +156,19 @@ def _slice_windows(
     rows: FloatArray,
     counts: IndexArray,
 ) -> None:
-    found, around, alone = np.empty(CAPACITY, np.int64), np.empty((3, CAPACITY)), np.empty((3, CAPACITY))
-    flat, samples = np.empty((2, CAPACITY)), np.empty((SAMPLES, 5), np.int64)
+    found, around, alone = (
+        np.empty(MOST_POINTS_OF_WINDOW, np.int64),
+        np.empty((3, MOST_POINTS_OF_WINDOW)),
+        np.empty((3, MOST_POINTS_OF_WINDOW)),
+    )
+    flat, samples = np.empty((2, MOST_POINTS_OF_WINDOW)), np.empty((SAMPLES, 5), np.int64)
     model, normal, basis, shape, quality = np.empty(7), np.empty(3), np.empty((2, 3)), np.empty(5), np.empty(3)
     for s in range(len(seeds)):
         seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1
         for _ in range(4):
             state = _draw(state)
         n = gather_ball(points, cells, starts, side, seed, reach, found)
-        if n < FEWEST:
+        if n < LEAST_POINTS_OF_SLICE:
             continue
         _copy_about(points, found, n, seed, around)
         least, greatest = max(radius_range[0], 4.0 * noise), min(radius_range[1], 0.75 * reach)
@@ -171,7 +176,7 @@ def _slice_windows(
         for p in range(planes + 1):
             counts[0] += 1
             # the first one across the longest direction, as thick as the window; then in all directions
-            thick, offset, size = THICKNESS * reach, 0.0, n
+            thick, offset, size = HALF_THICKNESS * reach, 0.0, n
             if p == 0:
                 thick, size = math.inf, _pick_slim(around, n, reach, normal, alone)
             else:
@@ -181,7 +186,7 @@ def _slice_windows(
             fill_basis(normal, basis)
             own = alone if p == 0 else around
             m = _project(own, size, normal, offset, thick, basis, flat)
-            if m < FEWEST:
+            if m < LEAST_POINTS_OF_SLICE:
                 counts[1] += 1
                 continue
             state = _fill_samples(state, m, samples)
@@ -191,7 +196,7 @@ def _slice_windows(
             fits = False
             for turn in range(1 if p == 0 else 2):
                 _set_model(normal, offset, basis, shape, 1.0 if turn == 0 else -1.0, model)
-                low, high = max(radius_range[0], 0.5 * model[6]), min(radius_range[1], 2.0 * model[6])
+                low, high = max(radius_range[0], 0.5 * model[RADIUS]), min(radius_range[1], 2.0 * model[RADIUS])
                 fit = polish(own, size, model, noise, low, high, supported[0], supported[1], 0.5 * low, quality)
                 fits = fits or fit == 2
                 if fit == 2 and quality[0] > rows[s, 7]:
@@ -259,11 +264,11 @@ def _find_shape(
         support = search_circle(flat, n, samples, 3.0 * noise + 0.02 * reach, least, greatest, shape)
     else:
         conic = np.empty(6)
-        tolerance = 3.0 * noise + 0.06 * THICKNESS * reach
+        tolerance = 3.0 * noise + 0.06 * HALF_THICKNESS * reach
         support = search_conic(flat, n, samples, tolerance, least, greatest, 3.0, conic)
         if support > 0.0 and not conic_shape(conic, shape):
             return False
-    return support >= 0.5 * FEWEST and support >= 0.25 * n
+    return support >= 0.5 * LEAST_POINTS_OF_SLICE and support >= 0.25 * n
 
 
 @njit(cache=True, nogil=True)
@@ -303,5 +308,5 @@ def _set_model(
     along, across = math.cos(shape[4]), math.sin(shape[4])
     for d in range(3):
         model[d] = shape[0] * basis[0, d] + shape[1] * basis[1, d] + offset * normal[d]
-        model[3 + d] = cosine * normal[d] + sine * (along * basis[0, d] + across * basis[1, d])
-    model[6] = shape[3]
+        model[UX + d] = cosine * normal[d] + sine * (along * basis[0, d] + across * basis[1, d])
+    model[RADIUS] = shape[3]

@@ -8,31 +8,31 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
-from cylx.geometry.cylinder import coordinates_of
+from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
 
 FloatArray = NDArray[np.float64]
 
-COSINE = math.cos(math.radians(8.0))
-SAME_COSINE = math.cos(math.radians(4.0))
-RADIUS_RATIO = 0.75
-OFFSET = 0.3
+LEAST_COSINE_OF_PIECES = math.cos(math.radians(8.0))
+LEAST_COSINE_OF_THE_SAME = math.cos(math.radians(4.0))
+LEAST_RADIUS_RATIO = 0.75
+MOST_OFFSET_OF_PIECES = 0.3
 """Axes further apart than this, in radii, and four standard deviations are those of two pipes."""
-LOST = 1.0
+LOST_BEYOND_ERROR = 1.0
 """If the error is more than this many radii, a piece no longer says where its pipe goes on: that may be another, unless
 there are points between the two."""
-FARTHEST = 4.0
+MOST_ERROR_OF_PIECES = 4.0
 """If it is more than this many, not even then."""
-BETWEEN = 12
+LEAST_POINTS_BETWEEN = 12
 """Fewest points on the surface between two pieces that tell of a pipe there, so sparse that no cluster was found."""
-DENSER = 4.0
+BRIDGE_DENSITY_RATIO = 4.0
 """How much denser points must lie on that surface than about it."""
-IN_LINE = 9.5
+MOST_CHI_SQUARE_IN_LINE = 9.5
 """Chi-square of four angles, which one in twenty true pairs exceeds."""
-ENOUGH = 10000
+ENOUGH_OF_EACH_PIECE = 10000
 """Points of each piece that suffice to see whether one cylinder explains both."""
-CLAIMED = 0.5
+MOST_CLAIMED_SHARE = 0.5
 """A cylinder that has more than this share of its points in common with better ones is one of them."""
 
 Judge = Callable[[Segment, Finding], Finding | None]
@@ -74,15 +74,15 @@ def _first_join(pool: list[Finding], i: int, indexed: IndexedCloud, judge: Judge
         return None
     one = pool[i].segment.model
     others = np.array([finding.segment.model for finding in rest])
-    ratios = others[:, 6] / one[6]
-    alike = np.abs(others[:, 3:6] @ one[3:6]) >= COSINE
-    alike &= (ratios >= RADIUS_RATIO) & (ratios * RADIUS_RATIO <= 1.0)
-    across = others[:, :3] - one[:3]
-    heights = across @ one[3:6]
-    apart = np.linalg.norm(across - heights[:, None] * one[3:6], axis=1)
+    ratios = others[:, RADIUS] / one[RADIUS]
+    alike = np.abs(others[:, DIRECTION] @ one[DIRECTION]) >= LEAST_COSINE_OF_PIECES
+    alike &= (ratios >= LEAST_RADIUS_RATIO) & (ratios * LEAST_RADIUS_RATIO <= 1.0)
+    across = others[:, POINT] - one[POINT]
+    heights = across @ one[DIRECTION]
+    apart = np.linalg.norm(across - heights[:, None] * one[DIRECTION], axis=1)
     offsets = np.array([finding.offset_error for finding in rest])
     errors = np.sqrt(pool[i].offset_error ** 2 + offsets**2 + (pool[i].tilt_error * heights) ** 2)
-    alike &= apart <= OFFSET * one[6] + 4.0 * errors
+    alike &= apart <= MOST_OFFSET_OF_PIECES * one[RADIUS] + 4.0 * errors
     for k in np.flatnonzero(alike):
         joined = _join(pool[i], rest[k], float(errors[k]), indexed, judge)
         if joined is not None:
@@ -104,14 +104,16 @@ def is_part_of(segment: Segment, known: FloatArray) -> bool:
     known : ndarray of shape (n, 8)
         From `as_rows`.
     """
-    model, radii = segment.model, known[:, 6]
-    alike = (np.abs(known[:, 3:6] @ model[3:6]) >= SAME_COSINE) & (np.abs(model[6] / radii - 1.0) <= 0.1)
+    model, radii = segment.model, known[:, RADIUS]
+    alike = (np.abs(known[:, DIRECTION] @ model[DIRECTION]) >= LEAST_COSINE_OF_THE_SAME) & (
+        np.abs(model[RADIUS] / radii - 1.0) <= 0.1
+    )
     known = known[alike]
-    across = model[:3] - known[:, :3]
-    heights = (across * known[:, 3:6]).sum(axis=1)
-    apart = np.linalg.norm(across - heights[:, None] * known[:, 3:6], axis=1)
-    along = np.abs(heights) + 0.5 * segment.half < known[:, 7] + 0.5 * known[:, 6]
-    return bool(((apart < 0.15 * known[:, 6]) & along).any())
+    across = model[POINT] - known[:, POINT]
+    heights = (across * known[:, DIRECTION]).sum(axis=1)
+    apart = np.linalg.norm(across - heights[:, None] * known[:, DIRECTION], axis=1)
+    along = np.abs(heights) + 0.5 * segment.half < known[:, 7] + 0.5 * known[:, RADIUS]
+    return bool(((apart < 0.15 * known[:, RADIUS]) & along).any())
 
 
 def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
@@ -126,7 +128,7 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
     claimed = np.zeros(count, np.bool_)
     kept = []
     for finding in sorted(findings, key=lambda finding: (-len(finding.points) * finding.payoff, -len(finding.points))):
-        if claimed[finding.points].mean() <= CLAIMED:
+        if claimed[finding.points].mean() <= MOST_CLAIMED_SHARE:
             claimed[finding.points] = True
             kept.append(finding)
     return kept
@@ -134,45 +136,46 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
 
 def _point_at_each_other(a: Finding, b: Finding) -> bool:
     """Tell whether the line through the middles of two pieces has the direction of both, as well as these are known."""
-    across = b.segment.model[:3] - a.segment.model[:3]
+    across = b.segment.point - a.segment.point
     distance = float(np.linalg.norm(across))
     place = (a.offset_error**2 + b.offset_error**2) / distance**2
     square = 0.0
     for finding in (a, b):
-        sine = np.linalg.norm(np.cross(finding.segment.model[3:6], across)) / distance
+        sine = np.linalg.norm(np.cross(finding.segment.direction, across)) / distance
         square += float(sine) ** 2 / max(finding.tilt_error**2 + place, 1e-300)
-    return square < IN_LINE
+    return square < MOST_CHI_SQUARE_IN_LINE
 
 
 def _is_bridged(indexed: IndexedCloud, model: FloatArray, half: float, width: float) -> bool:
     """Tell whether points lie on a cylinder about its middle, and next to none beside its surface."""
-    reach = model[6] + max(0.5 * model[6], 4.0 * width)
+    reach = model[RADIUS] + max(0.5 * model[RADIUS], 4.0 * width)
     near = indexed.cells.near_cylinder(model, -half, half, 0.0, reach)
-    _, residuals, _ = coordinates_of(indexed.points, near[indexed.may_be_on(near, model[6])], model)
+    _, residuals, _ = coordinates_of(indexed.points, near[indexed.may_be_on(near, model[RADIUS])], model)
     on = np.abs(residuals) < width
-    areas = 4.0 * model[6] * width, reach**2 - 4.0 * model[6] * width
+    areas = 4.0 * model[RADIUS] * width, reach**2 - 4.0 * model[RADIUS] * width
     about = float((~on).sum()) * areas[0] / areas[1]
-    return bool(on.sum() >= BETWEEN and on.sum() > DENSER * about)
+    return bool(on.sum() >= LEAST_POINTS_BETWEEN and on.sum() > BRIDGE_DENSITY_RATIO * about)
 
 
 def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Judge) -> Finding | None:
     """Fit one cylinder to two pieces alike and in line within an error; None if it does not explain both."""
     one, two = a.segment, b.segment
-    across = two.model[:3] - one.model[:3]
-    height = float(across @ one.model[3:6])
+    across = two.point - one.point
+    height = float(across @ one.direction)
     gap, model = abs(height) - one.half - two.half, one.model.copy()
-    far = gap > 2.0 * (one.half + two.half) and error > OFFSET * one.model[6]
+    far = gap > 2.0 * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
     if far:
-        if error > FARTHEST * one.model[6] or not _point_at_each_other(a, b):
+        if error > MOST_ERROR_OF_PIECES * one.radius or not _point_at_each_other(a, b):
             return None
-        model[3:6] = across * math.copysign(1.0 / float(np.linalg.norm(across)), height)
+        model[DIRECTION] = across * math.copysign(1.0 / float(np.linalg.norm(across)), height)
     low, high = min(-one.half, height - two.half), max(one.half, height + two.half)
-    model[:3] += 0.5 * (low + high) * model[3:6]
+    model[POINT] += 0.5 * (low + high) * model[DIRECTION]
     half = 0.5 * (high - low)
+    end = FIT_BEYOND_ENDS * half
     noise = indexed.noise_about(one.model, one.half)
-    schedule = WeightSchedule(max(0.1 * model[6], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
-    pieces = [indexed.points[finding.points[:: 1 + len(finding.points) // ENOUGH]] for finding in (a, b)]
-    fit = fit_cylinder(np.concatenate(pieces), model, low=-1.02 * half, high=1.02 * half, schedule=schedule, steps=30)
+    schedule = WeightSchedule(max(0.1 * model[RADIUS], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+    pieces = [indexed.points[finding.points[:: 1 + len(finding.points) // ENOUGH_OF_EACH_PIECE]] for finding in (a, b)]
+    fit = fit_cylinder(np.concatenate(pieces), model, low=-end, high=end, schedule=schedule, steps=30)
     if fit is None:
         return None
     model, spread = fit
@@ -181,12 +184,12 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
         return None
     width = 3.0 * max(min(spread, 2.0 * noise), noise)
     for piece, share in zip(pieces, (0.9, 0.8), strict=True):
-        offsets = piece - model[:3]
-        along = offsets @ model[3:6]
+        offsets = piece - model[POINT]
+        along = offsets @ model[DIRECTION]
         distances = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))
-        if (np.abs(distances - model[6]) < width).mean() < share:
+        if (np.abs(distances - model[RADIUS]) < width).mean() < share:
             return None
-    lost = far and error > LOST * one.model[6]
+    lost = far and error > LOST_BEYOND_ERROR * one.radius
     if lost and not _is_bridged(indexed, model, 0.5 * gap - abs(one.half - two.half), 0.5 * width):
         return None
     return judge(Segment(model, half, spread), a if a.payoff >= b.payoff else b)

@@ -19,9 +19,9 @@ from cylx.evidence.weights import weigh
 from cylx.geometry.coverage import covered_angle
 from cylx.records import IndexedCloud, Segment
 
-LEAST = 20
+LEAST_POINTS_TO_MEASURE = 20
 """Points on the surface without which nothing can be measured."""
-MANY = 20000
+ENOUGH_TO_MEASURE = 20000
 """Points on the surface that suffice for the measures."""
 
 
@@ -81,18 +81,18 @@ def verify(
     """
     whole = look_at(segment, indexed)
     points = whole.indices[whole.on]
-    shell = whole.thinned(max(1, len(points) // MANY))
-    if shell.on.sum() < LEAST:
+    shell = whole.thinned(max(1, len(points) // ENOUGH_TO_MEASURE))
+    if shell.on.sum() < LEAST_POINTS_TO_MEASURE:
         return Verdict("too few points", 0.0, {}, 0.0, points)
     coverage = covered_angle(shell.angles[shell.on])
-    radius = float(segment.model[6])
+    radius = segment.radius
     noise = indexed.noise_about(segment.model, segment.half)
     deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
     shape = shape_of(shell, segment, deviation)
     lack, structure = lack_of_fit(shell, deviation)
     inside, outside = emptiness(shell, radius)
     consistent, near = counts
-    along = math.copysign(1.0, segment.model[3 + int(np.abs(segment.model[3:6]).argmax())])  # as the result has it
+    along = math.copysign(1.0, segment.direction[np.abs(segment.direction).argmax()])  # as the result has it
     measures = {
         "noise_ratio": deviation / noise,
         "lack_of_fit": lack,
