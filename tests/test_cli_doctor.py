@@ -82,7 +82,7 @@ def test_kernels_that_cannot_be_kept_are_told_of(monkeypatch, tmp_path):
     def nowhere():
         raise RuntimeError("cannot cache function 'find_cell': no locator available")
 
-    monkeypatch.setattr("cylx.pipeline.warmup.kernel_folder", nowhere)
+    monkeypatch.setattr("cylx.api.warmup.kernel_folder", nowhere)
     check = doctor.check_kernels()
     assert (check.state, check.needed) == ("broken", True)
     assert check.detail.startswith("cannot cache function 'find_cell': no locator available; ")

@@ -92,7 +92,7 @@ def test_help_imports_nothing_heavy(spawn_cylx, args):
 
 def test_extracting_imports_only_what_it_needs(spawn_cylx, scan, tmp_path):
     prelude = (
-        "import atexit, sys, cylx.pipeline as pipeline; pipeline.kernels_are_cold = lambda: False;"
+        "import atexit, sys, cylx.api.warmup as warmup; warmup.kernels_are_cold = lambda: False;"
         "atexit.register(lambda: print(*sys.modules, file=sys.stderr))"
     )
     shown = spawn_cylx("extract", scan, "-o", tmp_path / "found.json", "--quiet", prelude=prelude)

@@ -1,4 +1,4 @@
-"""Clusters in turns: threads change no byte, pieces of a pipe become one, and pipes side by side stay apart."""
+"""Clusters in rounds: threads change no byte, pieces of a pipe become one, and pipes side by side stay apart."""
 
 import math
 

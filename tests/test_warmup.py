@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 
-from cylx.pipeline import warmup
+from cylx.api import warmup
 
 
 def test_the_end_of_the_method_is_practised_whole(monkeypatch):

@@ -27,7 +27,7 @@ from cylx.baselines.proposal import Proposal
 from cylx.config import JinConfig
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import canonical_direction
-from cylx.records import Frame
+from cylx.records import Frame, stream
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.int64]
@@ -68,7 +68,7 @@ def find_by_spheres(
     """
     spheres = _find_spheres(frame, limits.radii, config, seed, threads)
     spheres = spheres[_straight(spheres, config.min_linearity)]
-    rng = np.random.default_rng([seed, 13])
+    rng = stream(seed, "centre lines")
     while len(spheres) >= config.min_spheres:
         pairs = rng.integers(len(spheres), size=(config.line_iterations, 2))
         member = _best_line(spheres, pairs, config.line_distance, limits)
@@ -83,7 +83,7 @@ def find_by_spheres(
 
 def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, seed: int, threads: int) -> FloatArray:
     """Look for a sphere about each of many points; give centre and radius of those found, shape (n, 4)."""
-    rng = np.random.default_rng([seed, 12])
+    rng = stream(seed, "ball places")
     extent = float(np.linalg.norm(np.ptp(frame.points, axis=0)))
     lowest, highest = min(SMALLEST, LARGEST * extent), LARGEST * extent
     reaches = np.exp(rng.uniform(math.log(lowest), math.log(highest), config.seeds))
@@ -101,7 +101,7 @@ def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, s
         near = near[:: max(1, len(near) // ENOUGH_OF_A_BALL)]
         if len(near) < LEAST_POINTS_OF_BALL:
             return None
-        samples = np.random.default_rng([seed, 14, k]).integers(len(near), size=(config.iterations, 4))
+        samples = stream(seed, "ball samples", k).integers(len(near), size=(config.iterations, 4))
         sphere = np.empty(4)
         count = _search_sphere(near, samples, distance, radii[0], radii[1], sphere)
         return sphere if count >= max(LEAST_POINTS_OF_BALL, config.min_share * len(near)) else None

@@ -44,7 +44,7 @@ def find_by_consensus(
     limits: Limits,
     config: MsacConfig,
     *,
-    seed: int,
+    rng: np.random.Generator,
     threads: int,
 ) -> Iterator[Proposal]:
     """Find cylinders by MSAC, the best supported one first.
@@ -55,7 +55,7 @@ def find_by_consensus(
     limits : Limits
     config : MsacConfig
         Resolved.
-    seed : int
+    rng : numpy.random.Generator
     threads : int
         Does not change the result.
 
@@ -68,7 +68,6 @@ def find_by_consensus(
     ConfigError
         If open3d cannot be imported.
     """
-    rng = np.random.default_rng([seed, 11])
     # in random order the loss of a bad hypothesis exceeds the best one's after a few points
     order = rng.permutation(len(frame.points))
     points = frame.points[order]

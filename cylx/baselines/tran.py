@@ -67,7 +67,7 @@ def find_by_growing(
     limits: Limits,
     config: TranConfig,
     *,
-    seed: int,
+    rng: np.random.Generator,
     threads: int,
 ) -> Iterator[Proposal]:
     """Find cylinders as modes of many that were grown from seeds, the one that most of them led to first.
@@ -78,7 +78,7 @@ def find_by_growing(
     limits : Limits
     config : TranConfig
         Resolved.
-    seed : int
+    rng : numpy.random.Generator
     threads : int
         Does not change the result.
 
@@ -91,7 +91,6 @@ def find_by_growing(
     ConfigError
         If open3d cannot be imported.
     """
-    rng = np.random.default_rng([seed, 15])
     garden = _Garden(frame, normals_for("tran", frame.points, config.neighbours), limits.radii, config)
     drawn = rng.permutation(len(frame.points))[: DRAWN * config.seeds]
     starts = garden.curved_starts(drawn)[: config.seeds]

@@ -164,7 +164,7 @@ def check_kernels() -> Check:
     source = f"NUMBA_CACHE_DIR={told}" if told else "NUMBA_CACHE_DIR is not set"
     remedy = "set NUMBA_CACHE_DIR to a folder that can be written to"
     try:
-        from cylx.pipeline.warmup import kernel_folder, kernels_are_cold
+        from cylx.api.warmup import kernel_folder, kernels_are_cold
 
         folder = Path(kernel_folder())
         cold = kernels_are_cold()

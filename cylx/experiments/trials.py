@@ -14,7 +14,7 @@ from cylx.experiments.figures import Cell
 from cylx.experiments.scans import ObjectScan, cans_among_clutter, two_cans
 from cylx.geometry.cylinder import Cylinder
 from cylx.pipeline import extract_cylinders
-from cylx.records import Extraction, PointCloud
+from cylx.records import Extraction, PointCloud, stream
 from cylx.synthetic import single
 
 FloatArray = NDArray[np.float64]
@@ -67,7 +67,7 @@ def run_trial(cell: Cell, trial: int, scan: ObjectScan | None) -> Outcome:
         truth = single(**{**scene, "points": int(scene["points"])}, seed=trial)  # type: ignore[arg-type]  # floats
         found, seconds = _timed(truth.points, config_of(cell, trial, most=1))
         return _single_outcome(truth.cylinders[0].cylinder, found, seconds)
-    rng = np.random.default_rng([trial, 21])
+    rng = stream(trial, "trials")
     if "cans" in scene:
         points, centers = cans_among_clutter(scan, int(scene["cans"]), int(scene["points"]), rng)
     else:

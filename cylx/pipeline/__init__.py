@@ -1,26 +1,22 @@
-"""The method on one screen: slice, ellipses, candidates, clustering, averaging; then what makes it trustworthy."""
+"""The method on one screen: slices, ellipses, candidates, clustering, averaging; then what makes it trustworthy."""
 
 from __future__ import annotations
 
-import os
-from dataclasses import replace
-
 from cylx.config import Config
-from cylx.geometry.cells import Cells
 from cylx.pipeline.assembly import assemble
 from cylx.pipeline.candidates import (
-    candidates_along_axis,
     candidates_of_slices,
     candidates_of_windows,
+    cut_slices,
     ellipses_of_slices,
+    select_candidates,
     windows_and_explained,
 )
 from cylx.pipeline.rounds import Rounds
 from cylx.pipeline.stage_log import StageLog
-from cylx.pipeline.warmup import kernels_are_cold, practice_cloud, second_process
 from cylx.records import Candidates, Extraction, IndexedCloud, Observer, PointCloud, SilentObserver
-from cylx.scene import catalogue_of, check_usable, known_of, make_frame, radius_range, resolve
-from cylx.stages.clustering import CandidateGame, thin_candidates
+from cylx.scene import prepare
+from cylx.stages.clustering import CandidateGame
 
 __all__ = ["extract_cylinders"]
 
@@ -51,40 +47,36 @@ def extract_cylinders(
     ConfigError
         If the method needs open3d, and it cannot be imported.
     """
-    check_usable(cloud.points, cloud.source.file)
-    threads = threads or os.cpu_count() or 1
     log = StageLog(observer or SilentObserver())
-    if kernels_are_cold():
-        with log.stage("compiling"), second_process():
-            extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
+    with log.stage("scene"):
+        prepared = prepare(cloud, config, threads)
     if config.method != "gt":
         from cylx.pipeline.competitors import extract_by_competitor  # noqa: PLC0415  brings scipy.spatial: 0.3 s
 
-        return extract_by_competitor(cloud, config, threads, log)
-    with log.stage("scene"):
-        frame, scene = make_frame(cloud.points, config, threads)
-        scene = replace(scene, given=config.scene.given)
-        config = resolve(config, scene)
-        radii = radius_range(config, frame)
+        return extract_by_competitor(prepared, log)
     with log.stage("curvature"):
-        windows, explained = windows_and_explained(frame, radii, config, threads, log)
-        indexed = IndexedCloud(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
+        windows, explained = windows_and_explained(prepared, log)
+        indexed = IndexedCloud.of(prepared.frame, explained.flatness)
     with log.stage("slicing"):
-        fits = ellipses_of_slices(frame, explained.flatness, radii, config, threads, log)
+        slices = cut_slices(prepared, explained.flatness, log)
+    with log.stage("ellipses"):
+        ellipses = ellipses_of_slices(prepared, slices, log)
     with log.stage("candidates"):
-        whole = candidates_of_slices(fits, frame, radii, config, log)
-        local = candidates_of_windows(frame, explained, radii, config, threads, log)
-        candidates = Candidates.joined([windows, whole, local])
+        of_slices = candidates_of_slices(prepared, ellipses, log)
+        local = candidates_of_windows(prepared, explained, log)
+        found = Candidates.joined([windows, of_slices, local])
+        all_windows = Candidates.joined([windows, local]) if len(windows) else found
+        candidates = select_candidates(prepared, found, log)
     with log.stage("clustering"):
-        candidates = candidates_along_axis(candidates, config, log)
-        candidates = thin_candidates(candidates) if config.clustering.population == "local" else candidates
-        all_windows = Candidates.joined([windows, local]) if len(windows) else candidates
-        game = CandidateGame(candidates, config.clustering, threads)
-        known, catalogue = known_of(config, frame), catalogue_of(config, frame)
-        rounds = Rounds(game, candidates, all_windows, indexed, radii, known, catalogue, config, threads)
-    with log.stage("averaging"):
-        findings = rounds.play(log)
+        game = CandidateGame(candidates, prepared.config.clustering, prepared.threads)
+    rounds = Rounds(prepared, indexed, game, all_windows)
+    for clusters in rounds.clusters(log):
+        with log.stage("averaging"):
+            segments = rounds.fit(clusters)
+        with log.stage("verification"):
+            rounds.verify(segments, log)
+    rounds.report(log)
     with log.stage("merging"):
-        findings = rounds.merge(findings, log)
+        findings = rounds.merge(log)
     with log.stage("labelling"):
-        return assemble(cloud, frame, scene, indexed, findings, rounds.refused, log.reports, config)
+        return assemble(prepared, indexed, findings, rounds.rejected, log.reports)

@@ -21,40 +21,35 @@ from cylx.records import (
     Scene,
     StageReport,
 )
+from cylx.scene import Prepared
 from cylx.scene.cautions import damage
 from cylx.stages.averaging import inflation
 from cylx.stages.labelling import label_points, surface_points
 
 
 def assemble(
-    cloud: PointCloud,
-    frame: Frame,
-    scene: Scene,
+    prepared: Prepared,
     indexed: IndexedCloud,
     findings: list[Finding],
-    refused: list[RejectedSegment],
+    rejected: list[RejectedSegment],
     reports: list[StageReport],
-    config: Config,
 ) -> Extraction:
     """Label the points, number the cylinders by confidence, and put everything into scene units.
 
     Parameters
     ----------
-    cloud : PointCloud
-    frame : Frame
-    scene : Scene
+    prepared : Prepared
     indexed : IndexedCloud
     findings : list of Finding
-    refused : list of RejectedSegment
+    rejected : list of RejectedSegment
         What was not accepted, in the order it came.
     reports : list of StageReport
-    config : Config
-        Resolved.
 
     Returns
     -------
     Extraction
     """
+    cloud, frame, scene, config = prepared.cloud, prepared.frame, prepared.scene, prepared.config
     labels, residuals = label_points([finding.segment for finding in findings], indexed)
     counts = np.bincount(labels[labels >= 0], minlength=len(findings))
     game = config.method == "gt"
@@ -84,8 +79,8 @@ def assemble(
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
     warnings = (*_warnings(cloud, scene, fits), *_contradicted(config, fits), *_unlisted(config, fits))
     lost = [RejectedSegment.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
-    rejected = tuple(_rejections([*refused, *lost], frame, indexed, verified=verified, game=game))
-    return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, rejected)
+    shown = tuple(_rejected([*rejected, *lost], frame, indexed, verified=verified, game=game))
+    return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, shown)
 
 
 def _covariance(finding: Finding, spacing: float) -> NDArray[np.float64] | None:
@@ -108,13 +103,13 @@ def _nominal(finding: Finding, config: Config, spacing: float) -> NominalRadius 
     )
 
 
-def _rejections(
-    refused: list[RejectedSegment], frame: Frame, indexed: IndexedCloud, *, verified: bool, game: bool
+def _rejected(
+    segments: list[RejectedSegment], frame: Frame, indexed: IndexedCloud, *, verified: bool, game: bool
 ) -> list[RejectedFit]:
-    """Put what was refused into scene units, the most trusted first; what has no shape at all is left out."""
+    """Put what was not accepted into scene units, the most trusted first; what has no shape at all is left out."""
     out = []
-    for rejected_segment in refused:
-        segment = rejected_segment.segment
+    for one in segments:
+        segment = one.segment
         if not (np.isfinite(segment.model).all() and segment.radius > 0.0 and segment.half >= 0.0):
             continue
         _, residuals, angles = surface_points(segment, indexed)
@@ -122,13 +117,13 @@ def _rejections(
             frame.to_scene(segment.cylinder),
             len(residuals),
             float(np.sqrt((residuals**2).sum() / max(len(residuals), 1))) * frame.spacing,
-            rejected_segment.coverage if rejected_segment.measures else covered_angle(angles),
-            rejected_segment.support,
-            rejected_segment.payoff if game else None,
-            rejected_segment.confidence if verified else None,
-            rejected_segment.measures,
+            one.coverage if one.measures else covered_angle(angles),
+            one.support,
+            one.payoff if game else None,
+            one.confidence if verified else None,
+            one.measures,
         )
-        out.append(RejectedFit(fit, rejected_segment.reason))
+        out.append(RejectedFit(fit, one.reason))
     return sorted(out, key=lambda one: (one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers))
 
 

@@ -1,4 +1,4 @@
-"""The two sources of candidates: slices, as in the paper, and local curvature; and which of them may play."""
+"""The two sources of candidates: slices, as in the paper, and local curvature; and which of them play the game."""
 
 from __future__ import annotations
 
@@ -7,11 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
-from cylx.config import Config
 from cylx.geometry.lines import are_along
+from cylx.geometry.plane import Plane
 from cylx.pipeline.stage_log import StageLog
-from cylx.records import Candidates, EllipseFit, Explained, Frame
+from cylx.records import Candidates, EllipseFit, Explained, Slice, stream
+from cylx.scene import Prepared
 from cylx.stages.candidates import polish_candidates, propose_cylinders
+from cylx.stages.clustering import thin_candidates
 from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
 from cylx.stages.local_slices import slice_windows
@@ -27,10 +29,9 @@ MARGIN = 5.0
 """A candidate, which saw a few points, may be off the axis that is asked for by so many degrees more."""
 
 
-def windows_and_explained(
-    frame: Frame, radii: tuple[float, float], config: Config, threads: int, log: StageLog
-) -> tuple[Candidates, Explained]:
+def windows_and_explained(prepared: Prepared, log: StageLog) -> tuple[Candidates, Explained]:
     """Propose candidates from curved windows, and tell which points lie in flat ones."""
+    frame, radii, config, threads = prepared.frame, prepared.radii, prepared.config, prepared.threads
     if "curvature" in config.candidates.sources:
         windows, explained, report = find_curved_windows(frame, radii, config.candidates, threads)
         log.reports.append(report)
@@ -41,79 +42,97 @@ def windows_and_explained(
     return Candidates.joined([]), explained
 
 
-def ellipses_of_slices(
-    frame: Frame, flatness: FloatArray, radii: tuple[float, float], config: Config, threads: int, log: StageLog
-) -> list[list[EllipseFit]]:
-    """Cut the cloud by random planes and fit all ellipses; each slice has a generator of its own."""
+def cut_slices(prepared: Prepared, flatness: FloatArray, log: StageLog) -> list[Slice | None]:
+    """Cut the cloud by random planes; None for a slice of too few points."""
+    frame, config = prepared.frame, prepared.config
     if "slices" not in config.candidates.sources:
         return []
     planes = draw_planes(frame, config.slicing, config.seed, config.scene.axis)
     thickness = (config.slicing.thickness or 0.0) / frame.spacing
-    polished = config.method == "gt" and config.candidates.polish
-    tolerance = (config.ellipses.tolerance or 0.0) / frame.spacing
     # points of large flat windows are explained already; the paper's preset has none
     eligible = frame.points[flatness < LARGE * frame.window] if flatness.any() else frame.points
 
-    def work(index: int) -> list[EllipseFit] | None:
-        section = cut_slice(eligible, planes[index], thickness)
-        if len(section.points) < config.slicing.min_points:
-            return None
+    def work(plane: Plane) -> Slice | None:
+        section = cut_slice(eligible, plane, thickness)
+        return None if len(section.points) < config.slicing.min_points else section
+
+    with ThreadPoolExecutor(prepared.threads) as pool:
+        slices = list(pool.map(work, planes))
+    few = sum(1 for section in slices if section is None)
+    log.report("slicing", len(planes), len(planes) - few, {"too few points": few})
+    return slices
+
+
+def ellipses_of_slices(prepared: Prepared, slices: list[Slice | None], log: StageLog) -> list[list[EllipseFit]]:
+    """Fit the ellipses of all slices; each slice has a generator of its own."""
+    config = prepared.config
+    if "slices" not in config.candidates.sources:
+        return []
+    polished = config.method == "gt" and config.candidates.polish
+    tolerance = (config.ellipses.tolerance or 0.0) / prepared.frame.spacing
+
+    def work(index: int) -> list[EllipseFit]:
+        section = slices[index]
+        if section is None:
+            return []
         return fit_ellipses(
             section,
             config.ellipses,
             min_points=config.slicing.min_points,
             link=LINK,
             tolerance=tolerance,
-            radius_range=radii,
-            rng=np.random.default_rng([config.seed, 3, index]),
+            radius_range=prepared.radii,
+            rng=stream(config.seed, "ellipses", index),
             refits=0 if polished else 3,  # the polish sees the points in space
         )
 
-    with ThreadPoolExecutor(threads) as pool:
-        results = list(pool.map(work, range(len(planes))))
-    fits = [result or [] for result in results]
-    few = sum(1 for result in results if result is None)
-    log.report("slicing", len(planes), len(planes) - few, {"too few points": few})
-    empty = sum(1 for result in results if result == [])
-    log.report("ellipses", len(planes) - few, sum(map(len, fits)), {"no ellipse in the slice": empty})
+    with ThreadPoolExecutor(prepared.threads) as pool:
+        fits = list(pool.map(work, range(len(slices))))
+    cut = sum(1 for section in slices if section is not None)
+    empty = sum(1 for section, found in zip(slices, fits, strict=True) if section is not None and not found)
+    log.report("ellipses", cut, sum(map(len, fits)), {"no ellipse in the slice": empty})
     return fits
 
 
-def candidates_of_slices(
-    fits: list[list[EllipseFit]], frame: Frame, radii: tuple[float, float], config: Config, log: StageLog
-) -> Candidates:
+def candidates_of_slices(prepared: Prepared, fits: list[list[EllipseFit]], log: StageLog) -> Candidates:
     """Make two candidates of each ellipse, and polish them if asked for."""
     proposed = propose_cylinders(fits)
     if not fits:
         return proposed
     kept = proposed
-    if config.candidates.polish and len(proposed):
-        kept = polish_candidates(proposed, frame, radii, config.candidates)
+    if prepared.config.candidates.polish and len(proposed):
+        kept = polish_candidates(proposed, prepared.frame, prepared.radii, prepared.config.candidates)
     log.report("candidates", len(proposed), len(kept), {"does not fit": len(proposed) - len(kept)})
     return kept
 
 
-def candidates_of_windows(
-    frame: Frame, explained: Explained, radii: tuple[float, float], config: Config, threads: int, log: StageLog
-) -> Candidates:
+def candidates_of_windows(prepared: Prepared, explained: Explained, log: StageLog) -> Candidates:
     """Cut windows of all scales by planes, where nothing else explains the points."""
+    config = prepared.config
     if "slices" not in config.candidates.sources or not config.slicing.local_planes:
         return Candidates.joined([])
     supported = config.candidates.min_inliers, config.candidates.min_share
     found, counts = slice_windows(
-        frame, explained, radii, config.slicing, config.candidates.octave, supported, config.seed, threads
+        prepared.frame,
+        explained,
+        prepared.radii,
+        config.slicing,
+        config.candidates.octave,
+        supported,
+        config.seed,
+        prepared.threads,
     )
     cut = counts.pop("slices")
     log.report("local slicing", cut, len(found), counts)
     return found
 
 
-def candidates_along_axis(candidates: Candidates, config: Config, log: StageLog) -> Candidates:
-    """Keep the candidates about the axis that is asked for, if one is."""
-    axis = config.scene.axis
-    if axis is None:
-        return candidates
-    tolerance = np.radians(config.scene.axis_tolerance_deg + MARGIN)
-    kept = candidates.take(are_along(candidates.directions, axis, tolerance))
-    log.report("priors", len(candidates), len(kept), {"axis out of range": len(candidates) - len(kept)})
-    return kept
+def select_candidates(prepared: Prepared, candidates: Candidates, log: StageLog) -> Candidates:
+    """Keep the candidates that play the game: about the axis that is asked for, and not too many that say the same."""
+    config = prepared.config
+    if config.scene.axis is not None:
+        tolerance = np.radians(config.scene.axis_tolerance_deg + MARGIN)
+        kept = candidates.take(are_along(candidates.directions, config.scene.axis, tolerance))
+        log.report("priors", len(candidates), len(kept), {"axis out of range": len(candidates) - len(kept)})
+        candidates = kept
+    return thin_candidates(candidates) if config.clustering.population == "local" else candidates

@@ -5,33 +5,27 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
 from cylx.baselines import Limits, Proposal, find_by_consensus, find_by_growing, find_by_spheres, fit_line_of_centres
-from cylx.config import Config
-from cylx.geometry.cells import Cells
 from cylx.geometry.coverage import covered_angle
 from cylx.pipeline.assembly import assemble
-from cylx.pipeline.candidates import ellipses_of_slices
+from cylx.pipeline.candidates import cut_slices, ellipses_of_slices
 from cylx.pipeline.stage_log import StageLog
-from cylx.records import Extraction, Finding, Frame, IndexedCloud, PointCloud, RejectedSegment
-from cylx.scene import make_frame, out_of_range, radius_range, resolve
+from cylx.records import Extraction, Finding, IndexedCloud, RejectedSegment, stream
+from cylx.scene import Prepared, out_of_range
 from cylx.stages.averaging import measure_extent
 from cylx.stages.labelling import surface_points
 
 
-def extract_by_competitor(cloud: PointCloud, config: Config, threads: int, log: StageLog) -> Extraction:
+def extract_by_competitor(prepared: Prepared, log: StageLog) -> Extraction:
     """Find the cylinders of a cloud by the method that the configuration names.
 
     Parameters
     ----------
-    cloud : PointCloud
-    config : Config
-        Its method is not `gt`.
-    threads : int
-        Does not change the result.
+    prepared : Prepared
+        Its configuration names another method than `gt`.
     log : StageLog
 
     Returns
@@ -44,59 +38,52 @@ def extract_by_competitor(cloud: PointCloud, config: Config, threads: int, log: 
     ConfigError
         If the method needs open3d, and it cannot be imported.
     """
-    with log.stage("scene"):
-        frame, scene = make_frame(cloud.points, config, threads)
-        scene = replace(scene, given=config.scene.given)
-        config = resolve(config, scene)
-        radii = radius_range(config, frame)
-        indexed = IndexedCloud(Cells(frame.points, frame.codes), np.zeros(len(frame.points)), frame.noise)
+    method, most = prepared.config.method, prepared.config.max_cylinders
+    indexed = IndexedCloud.of(prepared.frame, np.zeros(len(prepared.frame.points)))
     findings: list[Finding] = []
-    refused: list[RejectedSegment] = []
-    with log.stage(config.method):
-        for proposal in _proposals(frame, radii, config, threads, log):
-            outcome = _with_extent(proposal, indexed, radii, config)
+    rejected: list[RejectedSegment] = []
+    with log.stage(method):
+        for proposal in _proposals(prepared, log):
+            outcome = _with_extent(proposal, indexed, prepared)
             if isinstance(outcome, Finding):
                 findings.append(outcome)
             else:
-                refused.append(outcome)
+                rejected.append(outcome)
             log.advance()
-            if len(findings) == config.max_cylinders:
+            if len(findings) == most:
                 break
-    counts = Counter(one.reason for one in refused)
-    log.report(config.method, len(findings) + len(refused), len(findings), counts)
+    counts = Counter(one.reason for one in rejected)
+    log.report(method, len(findings) + len(rejected), len(findings), counts)
     with log.stage("labelling"):
-        return assemble(cloud, frame, scene, indexed, findings, refused, log.reports, config)
+        return assemble(prepared, indexed, findings, rejected, log.reports)
 
 
-def _proposals(
-    frame: Frame, radii: tuple[float, float], config: Config, threads: int, log: StageLog
-) -> Iterable[Proposal]:
+def _proposals(prepared: Prepared, log: StageLog) -> Iterable[Proposal]:
     """Run the method, as far as its cylinders are asked for."""
+    frame, radii, config, threads = prepared.frame, prepared.radii, prepared.config, prepared.threads
     if config.method == "line-fit":
-        fits = ellipses_of_slices(frame, np.zeros(len(frame.points)), radii, config, threads, log)
-        return fit_line_of_centres(fits, frame, config.line_fit)
+        slices = cut_slices(prepared, np.zeros(len(frame.points)), log)
+        return fit_line_of_centres(ellipses_of_slices(prepared, slices, log), frame, config.line_fit)
     limits = Limits(radii)
     if config.scene.axis is not None:
         along = np.array(config.scene.axis, dtype=np.float64)
         limits = Limits(radii, along / np.linalg.norm(along), math.radians(config.scene.axis_tolerance_deg))
     if config.method == "msac":
-        return find_by_consensus(frame, limits, config.msac, seed=config.seed, threads=threads)
+        return find_by_consensus(frame, limits, config.msac, rng=stream(config.seed, "msac"), threads=threads)
     if config.method == "tran":
-        return find_by_growing(frame, limits, config.tran, seed=config.seed, threads=threads)
+        return find_by_growing(frame, limits, config.tran, rng=stream(config.seed, "tran"), threads=threads)
     return find_by_spheres(frame, limits, config.jin, seed=config.seed, threads=threads)
 
 
-def _with_extent(
-    proposal: Proposal, indexed: IndexedCloud, radii: tuple[float, float], config: Config
-) -> Finding | RejectedSegment:
+def _with_extent(proposal: Proposal, indexed: IndexedCloud, prepared: Prepared) -> Finding | RejectedSegment:
     """Give a cylinder the extent that is seen of it, or else that of what it was found on; hold it to the limits."""
     segment, support = proposal
-    if reason := out_of_range(segment, radii, config.scene):
+    if reason := out_of_range(segment, prepared.radii, prepared.config.scene):
         return RejectedSegment(segment, reason, support, 0.0)
     seen = measure_extent(segment, indexed)
     segment = segment if isinstance(seen, str) else seen
     points, _, angles = surface_points(segment, indexed)
     coverage = covered_angle(angles)
-    if coverage < math.radians(config.verification.min_coverage_deg):
+    if coverage < math.radians(prepared.config.verification.min_coverage_deg):
         return RejectedSegment(segment, "coverage", support, 0.0, coverage=coverage)
     return Finding(segment, points, support, 0.0, 0.0, coverage, 0.0, 0.0)

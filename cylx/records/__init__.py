@@ -22,6 +22,7 @@ from cylx.records.cylinders import (
 from cylx.records.progress import Observer, SilentObserver, StageReport
 from cylx.records.scales import CELL, Explained, Scale
 from cylx.records.sources import Crop, Selection, Source
+from cylx.records.streams import stream
 
 __all__ = [
     "CELL",
@@ -50,6 +51,7 @@ __all__ = [
     "Source",
     "StageReport",
     "cell_keys",
+    "stream",
 ]
 
 

@@ -254,6 +254,11 @@ class IndexedCloud:
     flatness: FloatArray
     noise: Noise
 
+    @classmethod
+    def of(cls, frame: Frame, flatness: FloatArray) -> IndexedCloud:
+        """Put the points of a frame into cells."""
+        return cls(Cells(frame.points, frame.codes), flatness, frame.noise)
+
     @property
     def points(self) -> FloatArray:
         """The points, shape (N, 3)."""

@@ -31,13 +31,13 @@ class Observer(Protocol):
     """Somebody who watches the pipeline: a progress display, a profile."""
 
     def stage_started(self, name: str, total: int | None) -> None:
-        """Begin a stage of `total` steps, None if their number is not known."""
+        """Begin a stage of `total` steps, None if their number is not known; it may come in several parts."""
 
     def stage_advanced(self, steps: int) -> None:
         """Count `steps` further steps of the present stage."""
 
     def stage_finished(self, name: str, seconds: float) -> None:
-        """End a stage that took `seconds`."""
+        """End a stage, or a part of it, that took `seconds`."""
 
 
 class SilentObserver:

@@ -16,7 +16,7 @@ from cylx.config import Config
 from cylx.errors import InputError
 from cylx.geometry.bounding_box import box_of, extent_of, fill_scatter, widest_deviation
 from cylx.geometry.morton import BITS, morton_codes
-from cylx.records import Frame, Noise, Scene, cell_keys
+from cylx.records import Frame, Noise, Scene, cell_keys, stream
 from cylx.scene.noise import measure_surface
 from cylx.scene.noise_variation import noise_by_place, noise_by_size
 
@@ -123,7 +123,7 @@ def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
     Scene
     """
     ordered, _, codes, unit = canonical_order(points)
-    spacing, _, noise, _ = measure_surface(ordered, codes, unit, np.random.default_rng([seed, 1]))
+    spacing, _, noise, _ = measure_surface(ordered, codes, unit, stream(seed, "scene"))
     return Scene(spacing, noise, extent_of(points))
 
 
@@ -147,7 +147,7 @@ def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Fr
         What was measured or given, scene units.
     """
     ordered, order, codes, unit = canonical_order(points)
-    rng = np.random.default_rng([config.seed, 1])
+    rng = stream(config.seed, "scene")
     spacing, dense, measured, patches = measure_surface(ordered, codes, unit, rng, threads)
     noise = config.scene.noise or measured
     with ThreadPoolExecutor(1) as pool:  # the noise over larger pieces is measured while the points are put in order

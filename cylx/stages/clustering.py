@@ -39,11 +39,15 @@ class CandidateGame:
     config : ClusteringConfig
     threads : int
         Does not change the result.
+
+    Attributes
+    ----------
+    candidates : Candidates
     """
 
     def __init__(self, candidates: Candidates, config: ClusteringConfig, threads: int = 1) -> None:
         self._config = config
-        self._candidates = candidates
+        self.candidates = candidates
         self._alive = np.ones(len(candidates), np.bool_)
         self._places = Neighbourhood(candidates)
         self._dropped = {"too small": 0, "too little payoff": 0}
@@ -119,7 +123,7 @@ class CandidateGame:
     def report(self) -> StageReport:
         """Count the candidates that came in, the clusters, and what was dropped."""
         dropped = {name: count for name, count in self._dropped.items() if count}
-        return StageReport("clustering", len(self._candidates), self._clusters, dropped)
+        return StageReport("clustering", len(self.candidates), self._clusters, dropped)
 
     def _neighbourhood(self) -> IndexArray | None:
         """Give the best connected candidate that is left, and those it plays with."""

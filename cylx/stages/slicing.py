@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from cylx.config import SlicingConfig
 from cylx.geometry.cylinder import canonical_direction
 from cylx.geometry.plane import Plane, random_directions
-from cylx.records import Frame, Slice
+from cylx.records import Frame, Slice, stream
 
 FloatArray = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ def draw_planes(frame: Frame, config: SlicingConfig, seed: int, axis: list[float
     -------
     list of Plane
     """
-    rng = np.random.default_rng([seed, 2])
+    rng = stream(seed, "planes")
     normals = random_directions(config.planes, rng)
     if config.inclination_deg is not None and axis is not None:
         normals = _inclined(normals, canonical_direction(axis), config.inclination_deg, rng)

@@ -58,6 +58,7 @@ class Run:
 
         collect_rarely()
         import_numba_without_blas()
+        from cylx.api.warmup import compile_kernels
         from cylx.io import read_cloud
         from cylx.pipeline import extract_cylinders
         from cylx.scene import select
@@ -68,6 +69,7 @@ class Run:
             with observed(observer, "reading"):
                 cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
             check_format(job, cloud)
+            compile_kernels(observer)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
             with observed(observer, "writing"):
                 remarks = write_job(job, extraction, overwrite=self.overwrite)

@@ -77,22 +77,30 @@ class ProgressObserver:
     def __init__(self, display: Progress) -> None:
         self.display = display
         self.task: TaskID | None = None
-        self.done = 0
+        self.done: dict[str, int] = {}
+        self.name = ""
         self.total: int | None = None
 
     def stage_started(self, name: str, total: int | None) -> None:
         """Show a stage in the place of the one before."""
         if self.task is not None:
             self.display.remove_task(self.task)
-        self.task = self.display.add_task(_COMPILING if name == "compiling" else name, total=total, count="")
-        self.done, self.total = 0, total
+        self.name, self.total = name, total
+        done = self.done.setdefault(name, 0)  # of its parts before
+        shown = _COMPILING if name == "compiling" else name
+        self.task = self.display.add_task(shown, total=total, completed=done, count=self._count())
 
     def stage_advanced(self, steps: int) -> None:
         """Move the bar."""
         if self.task is not None:
-            self.done += steps
-            count = f"{self.done}" if self.total is None else f"{self.done}/{self.total}"
-            self.display.update(self.task, advance=steps, count=count)
+            self.done[self.name] += steps
+            self.display.update(self.task, advance=steps, count=self._count())
+
+    def _count(self) -> str:
+        done = self.done[self.name]
+        if self.total is None:
+            return f"{done or ''}"
+        return f"{done}/{self.total}" if done else ""
 
     def stage_finished(self, name: str, seconds: float) -> None:
         """Leave the line until the next stage starts."""

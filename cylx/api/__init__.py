@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cylx.api.warmup import compile_kernels
 from cylx.config import Config, Given, check_tolerance, load_config, named_options
 from cylx.io import read_cloud, read_json
 from cylx.pipeline import extract_cylinders
@@ -146,7 +147,8 @@ def extract(
         cloud = points_or_path
     else:
         cloud = PointCloud.from_array(points_or_path)
-    return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer or SilentObserver())
+    compile_kernels(observer or SilentObserver())
+    return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
 
 
 def read_result(path: str | PathLike[str]) -> Result:

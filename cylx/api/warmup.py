@@ -16,15 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import Config
-from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
 from cylx.geometry.morton import find_cell, morton_codes
+from cylx.pipeline import extract_cylinders
 from cylx.pipeline.assembly import assemble
 from cylx.pipeline.candidates import candidates_of_windows
 from cylx.pipeline.rounds import Rounds
 from cylx.pipeline.stage_log import StageLog
-from cylx.records import Candidates, Explained, Frame, IndexedCloud, Noise, PointCloud, Scene, SilentObserver
-from cylx.scene import resolve
+from cylx.records import Candidates, Explained, Frame, IndexedCloud, Noise, Observer, PointCloud, Scene, SilentObserver
+from cylx.scene import Prepared, resolve
 from cylx.stages.clustering import CandidateGame
 
 FloatArray = NDArray[np.float64]
@@ -32,6 +32,13 @@ FloatArray = NDArray[np.float64]
 SPACING, SIGMA = 0.1, 0.005
 LEVEL = 16
 """Of the voxels; below them a kernel cannot tell cells from one another anyway."""
+
+
+def compile_kernels(observer: Observer) -> None:
+    """Compile the kernels that are not compiled yet, by practising the whole method on a small cloud."""
+    if kernels_are_cold():
+        with StageLog(observer).stage("compiling"), second_process():
+            extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
 
 
 def kernels_are_cold() -> bool:
@@ -82,16 +89,16 @@ def practise_the_end() -> None:
     scene = Scene(SPACING, SIGMA, 16.0)
     config = resolve(Config(), scene)
     cloud = PointCloud(practice_cloud())
-    frame = _practice_frame(cloud.points)
-    radii, log = (0.5, 100.0), StageLog(SilentObserver())
-    explained = Explained(np.zeros(len(frame.points)), np.zeros(len(frame.points), np.bool_))
-    indexed = IndexedCloud(Cells(frame.points, frame.codes), explained.flatness, frame.noise)
-    candidates = _practice_candidates(frame)
-    game = CandidateGame(candidates, config.clustering, 1)
-    rounds = Rounds(game, candidates, candidates, indexed, radii, None, None, config, 1)
-    findings = rounds.merge(rounds.play(log), log)
-    assemble(cloud, frame, scene, indexed, findings, rounds.refused, log.reports, config)
-    candidates_of_windows(frame, explained, radii, config, 1, log)
+    prepared = Prepared(cloud, _practice_frame(cloud.points), scene, config, (0.5, 100.0), None, None, 1)
+    log, count = StageLog(SilentObserver()), len(cloud.points)
+    explained = Explained(np.zeros(count), np.zeros(count, np.bool_))
+    indexed = IndexedCloud.of(prepared.frame, explained.flatness)
+    candidates = _practice_candidates(prepared.frame)
+    rounds = Rounds(prepared, indexed, CandidateGame(candidates, config.clustering, 1), candidates)
+    for clusters in rounds.clusters(log):
+        rounds.verify(rounds.fit(clusters), log)
+    assemble(prepared, indexed, rounds.merge(log), rounds.rejected, log.reports)
+    candidates_of_windows(prepared, explained, log)
 
 
 def _practice_frame(points: FloatArray) -> Frame:
