@@ -34,7 +34,7 @@ MAY_IMPORT = {
     "evidence": {"geometry", "records"},
     "records": {"config", "fits", "geometry"},
     "synthetic": {"errors", "geometry"},
-    "evaluation": {"errors"},
+    "evaluation": {"errors", "geometry"},
     "config": {"errors"},
     "optional": {"errors"},
     "fits": {"geometry"},

@@ -11,7 +11,8 @@ from cylx.geometry.cells import Cells
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
-from cylx.stages.averaging import average_cluster, measure_extent, refine, refit
+from cylx.stages.averaging import average_cluster, refine, refit
+from cylx.stages.measuring import measure_extent
 from cylx.synthetic import single
 
 seeds = st.integers(0, 2**32 - 1)

@@ -13,9 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.config import Config
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
 from cylx.geometry.morton import find_cell, morton_codes
 from cylx.pipeline import extract_cylinders
@@ -26,8 +26,6 @@ from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Explained, Frame, IndexedCloud, Noise, Observer, PointCloud, Scene, SilentObserver
 from cylx.scene import Prepared, resolve
 from cylx.stages.clustering import CandidateGame
-
-FloatArray = NDArray[np.float64]
 
 SPACING, SIGMA = 0.1, 0.005
 LEVEL = 16

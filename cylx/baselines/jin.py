@@ -20,18 +20,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.baselines.limits import Limits
 from cylx.baselines.proposal import Proposal
 from cylx.config import JinConfig
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import canonical_direction
 from cylx.records import Frame, stream
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-MaskArray = NDArray[np.bool_]
 
 SMALLEST, LARGEST = 6.0, 0.25
 """Radii of neighbourhoods: in spacings, and as a share of the extent."""

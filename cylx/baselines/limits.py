@@ -6,9 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from cylx.geometry.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,15 +13,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.baselines.proposal import Proposal
 from cylx.config import LineFitConfig
 from cylx.fits.robust import WeightSchedule, fit_cylinder
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction, cylinder_coordinates
 from cylx.records import EllipseFit, Frame
-
-FloatArray = NDArray[np.float64]
 
 UNBOUNDED_WIDTH = 1e6
 """A weight function so many radii wide is none."""

@@ -18,18 +18,15 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.baselines.limits import Limits
 from cylx.baselines.normals import normals_for
 from cylx.baselines.proposal import Proposal
 from cylx.config import MsacConfig
 from cylx.fits.robust import WeightSchedule, fit_cylinder
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ, cylinder_coordinates
 from cylx.records import Frame
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 LEAST_SINE = 1e-4
 """Normals that are more nearly parallel than this have no axis."""

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cylx.errors import ConfigError
+from cylx.geometry.arrays import FloatArray
 from cylx.optional.open3d import estimate_normals
-
-FloatArray = NDArray[np.float64]
 
 
 def normals_for(method: str, points: FloatArray, neighbours: int) -> FloatArray:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.records import Segment
-
-FloatArray = NDArray[np.float64]
 
 
 class Proposal(NamedTuple):

@@ -21,21 +21,18 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from cylx.baselines.limits import Limits
 from cylx.baselines.normals import normals_for
 from cylx.baselines.proposal import Proposal
 from cylx.config import TranConfig
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cells import Cells
 from cylx.geometry.circle import fit_circle
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, axis_basis, canonical_direction, cylinder_coordinates
 from cylx.records import Frame
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 DRAWN = 4
 """Points drawn for each seed that is wanted; those on flat surface are no seeds."""

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import InputError
+from cylx.geometry.arrays import FloatArray, MaskArray
 
-FloatArray = NDArray[np.float64]
-MaskArray = NDArray[np.bool_]
 IndexArray = NDArray[np.intp]
 
 _NO_MATCH = 1e6  # far above the cost of any admissible pair

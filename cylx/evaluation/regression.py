@@ -11,13 +11,13 @@ import numpy as np
 from cylx.errors import UsageError
 from cylx.evaluation.matching import (
     CylinderTable,
-    FloatArray,
     PairErrors,
     match_one_to_one,
     pair_errors,
     read_cylinders,
     require_usable,
 )
+from cylx.geometry.arrays import FloatArray
 
 Kind = Literal["missing", "extra", "moved", "resized", "recounted"]
 

@@ -8,7 +8,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from cylx.errors import UsageError
-from cylx.evaluation.matching import MaskArray, match_one_to_one, pair_errors, read_cylinders, require_usable
+from cylx.evaluation.matching import match_one_to_one, pair_errors, read_cylinders, require_usable
+from cylx.geometry.arrays import MaskArray
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,11 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, coordinates_of
 from cylx.records import IndexedCloud, Segment
-
-FloatArray = NDArray[np.float64]
-MaskArray = NDArray[np.bool_]
 
 TRUNCATED = 0.9866
 """Standard deviation of a Gaussian cut off at three sigmas."""

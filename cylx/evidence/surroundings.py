@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.evidence.measures import Shell
+from cylx.geometry.arrays import MaskArray
 from cylx.geometry.coverage import SECTORS, filled_sectors, sector_of
-
-FloatArray = NDArray[np.float64]
-MaskArray = NDArray[np.bool_]
 
 PIECES_OF_HEIGHT = 10
 """Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""

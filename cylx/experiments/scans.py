@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.optional.open3d import estimate_normals
 
-FloatArray = NDArray[np.float64]
 FaceArray = NDArray[np.int64]
 
 SCANNED = 373_205

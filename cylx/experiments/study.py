@@ -11,15 +11,13 @@ from contextlib import contextmanager
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.experiments.figures import Cell, Figure
 from cylx.experiments.scans import ObjectScan
 from cylx.experiments.table import Key, Trials
 from cylx.experiments.trials import Outcome, run_trial
 from cylx.fits.cramer_rao import mean_errors_at_bound
-
-FloatArray = NDArray[np.float64]
+from cylx.geometry.arrays import FloatArray
 
 QUANTITIES = ("angle_deg", "offset", "radius_percent", "seconds")
 

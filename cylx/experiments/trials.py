@@ -7,17 +7,15 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.config import Config, load_config
 from cylx.experiments.figures import Cell
 from cylx.experiments.scans import ObjectScan, cans_among_clutter, two_cans
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder
 from cylx.pipeline import extract_cylinders
 from cylx.records import Extraction, PointCloud, stream
 from cylx.synthetic import single
-
-FloatArray = NDArray[np.float64]
 
 DISTANCE, NEIGHBOURHOOD = 0.0144, 0.286
 """2 mm, the paper's distance, and 1.2 radii, as shares of the extent of a soup can."""

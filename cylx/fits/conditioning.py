@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
 from cylx.geometry.numerics import fill_basis
-
-FloatArray = NDArray[np.float64]
 
 
 def given_radius(

@@ -5,10 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import quad
 
-FloatArray = NDArray[np.float64]
+from cylx.geometry.arrays import FloatArray
 
 
 def outlier_information(sigma: float, sigma_o: float, p: float) -> float:

@@ -13,13 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.fits.residual_law import BINS, Law, estimate_law
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ
 from cylx.geometry.numerics import fill_basis
-
-FloatArray = NDArray[np.float64]
 
 MIXTURE_ROUNDS, STEPS_A_ROUND = 3, 5
 CLOSE = 1e-4

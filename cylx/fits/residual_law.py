@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from cylx.geometry.arrays import FloatArray
 
 BINS = 240
 """Steps of the residual in which its law and the weights are tabulated."""

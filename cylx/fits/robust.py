@@ -13,12 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.geometry.numerics import FINITE, REORDERED, fill_basis, solve_in_place
-
-FloatArray = NDArray[np.float64]
 
 TUKEY = 4.685
 """Tuning constant of the biweight at 95 % efficiency, in standard deviations."""

@@ -8,11 +8,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.records import Candidates, Segment
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 WITNESS = 0.4
 """Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need

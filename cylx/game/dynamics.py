@@ -9,10 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
+from cylx.geometry.arrays import FloatArray, IndexArray
 
 EXTINCT = 1e-9
 """A share of the final population below this is taken for zero: replicators get there only in infinite time."""

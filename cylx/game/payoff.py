@@ -11,13 +11,12 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.game.dynamics import SparsePayoff
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
 
 PIECE = 4096
 """Candidates that one thread takes at a time."""
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 CUT = 0.1
 """Local payoffs below this are zero."""

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from cylx.geometry.arrays import FloatArray
 
 
 def box_of(points: FloatArray) -> FloatArray:

@@ -6,13 +6,10 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.geometry.morton import BITS, cell_starts
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 RUNS_IN_BLOCK = 32
 """Runs in a block; most blocks lie apart from a line as a whole."""

@@ -7,8 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-MaskArray = NDArray[np.bool_]
+from cylx.geometry.arrays import FloatArray, MaskArray
 
 SECTORS = 36
 

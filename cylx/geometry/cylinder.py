@@ -8,12 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.numerics import cross, fill_basis
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 POINT, DIRECTION, RADIUS = slice(0, 3), slice(3, 6), 6
 """Where a cylinder as a row of seven numbers has a point of its axis, the unit direction and the radius."""

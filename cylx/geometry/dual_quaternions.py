@@ -7,12 +7,10 @@ real part q0 with the dual part t q0 / 2, t being the pure quaternion of the tra
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.lines import common_perpendicular
 from cylx.geometry.numerics import cross
-
-FloatArray = NDArray[np.float64]
 
 
 def _product(p: FloatArray, q: FloatArray) -> FloatArray:

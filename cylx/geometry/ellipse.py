@@ -9,10 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.numerics import REORDERED, solve_in_place
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True)

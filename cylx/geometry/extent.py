@@ -8,9 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.numerics import median_of_positive, sort_in_place
-
-FloatArray = NDArray[np.float64]
 
 ARC_BINS = 24
 LEAST_POINTS_OF_EXTENT = 15

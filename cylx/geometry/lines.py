@@ -8,9 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.numerics import cross, symmetric_eigen
-
-FloatArray = NDArray[np.float64]
 
 LEAST_POINTS_OF_LINE = 8
 """Points that a line is fitted to."""

@@ -12,8 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
+from cylx.geometry.arrays import FloatArray, IndexArray
 
 BITS = 21
 """Bits an axis: 3 x 21 fit a signed 64-bit integer."""

@@ -14,9 +14,8 @@ from typing import Final
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from cylx.geometry.arrays import FloatArray
 
 REORDERED: Final = {"reassoc", "nsz", "arcp", "contract"}
 """What the compiler may do to sums; NaN and infinity keep their meaning."""

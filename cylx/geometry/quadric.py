@@ -11,12 +11,10 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import RADIUS, UX
 from cylx.geometry.numerics import REORDERED, fill_basis, solve_in_place, symmetric_eigen
-
-FloatArray = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)

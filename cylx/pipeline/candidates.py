@@ -5,8 +5,8 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.lines import are_along
 from cylx.geometry.plane import Plane
 from cylx.pipeline.stage_log import StageLog
@@ -18,8 +18,6 @@ from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
 from cylx.stages.local_slices import slice_windows
 from cylx.stages.slicing import cut_slice, draw_planes
-
-FloatArray = NDArray[np.float64]
 
 LARGE = 6.0
 """Flat windows of more than this many times the smallest one's radius hold planes; a cylinder is flat in small ones."""

@@ -15,8 +15,8 @@ from cylx.pipeline.candidates import cut_slices, ellipses_of_slices
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import Extraction, Finding, IndexedCloud, RejectedSegment, stream
 from cylx.scene import Prepared, out_of_range
-from cylx.stages.averaging import measure_extent
 from cylx.stages.labelling import surface_points
+from cylx.stages.measuring import measure_extent
 
 
 def extract_by_competitor(prepared: Prepared, log: StageLog) -> Extraction:

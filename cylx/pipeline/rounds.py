@@ -9,20 +9,17 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cylx.game.agreement import Neighbourhood, is_contradicted
+from cylx.geometry.arrays import FloatArray
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
-from cylx.stages.averaging import average_cluster, finish, inflation, measure_extent, refine, refit
+from cylx.stages.averaging import average_cluster, finish, inflation, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.extending import extend
+from cylx.stages.measuring import measure_extent
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
 from cylx.stages.verification import verify
-
-FloatArray = NDArray[np.float64]
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")

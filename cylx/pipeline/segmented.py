@@ -10,12 +10,12 @@ import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.errors import InputError
 from cylx.fits.likelihood import fit_mixture
 from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, unbiased_radius
 from cylx.fits.robust import fit_cylinder as fit_robustly
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import (
     DIRECTION,
@@ -32,7 +32,6 @@ from cylx.scene import check_usable
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-FloatArray = NDArray[np.float64]
 
 DIRECTIONS_TRIED = 500
 """Directions tried at first, over the half sphere: six degrees apart."""

@@ -6,15 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
 from cylx.geometry.ellipse import Ellipse
 from cylx.geometry.plane import Plane
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-MaskArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

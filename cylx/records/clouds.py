@@ -10,15 +10,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.bounding_box import extent_of
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import POINT, RADIUS, UX, UY, UZ, Cylinder
 from cylx.geometry.numerics import sort_in_place
 from cylx.records.sources import ARRAY, Source
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-MaskArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

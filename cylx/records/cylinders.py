@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.fits.nominal_radius import Choice, Decision
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, Cylinder
 from cylx.records.clouds import PointCloud, Scene
 from cylx.records.progress import StageReport
@@ -18,9 +19,6 @@ from cylx.records.shown import html_in_notebook
 
 if TYPE_CHECKING:
     from cylx.config import Config
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

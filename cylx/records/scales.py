@@ -6,15 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.morton import cell_starts, group, pick_one
 from cylx.records.clouds import Frame
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-MaskArray = NDArray[np.bool_]
-
 
 LEVELS_TO_BLOCK = 2
 """Levels from a voxel to the block of voxels that tells how many points one should have."""

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder, axis_basis, cylinder_coordinates
-
-FloatArray = NDArray[np.float64]
 
 MOST_COLUMNS, MOST_ROWS = 72, 48
 MOST_CELLS = MOST_COLUMNS * MOST_ROWS

@@ -6,9 +6,9 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.errors import UsageError
+from cylx.geometry.arrays import FloatArray
 from cylx.optional.matplotlib import new_figure
 from cylx.palette import cylinder_colors
 from cylx.records import Extraction
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from cylx.records import PointCloud
     from cylx.results import Result
 
-FloatArray = NDArray[np.float64]
 
 DPI = 125
 

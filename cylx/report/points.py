@@ -7,10 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.records import PointCloud
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 STEPS_ACROSS_BOX = 65535
 """Steps of a coordinate across the box that is shown."""

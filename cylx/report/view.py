@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import UsageError
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder
 from cylx.records import Extraction, PointCloud
 from cylx.report.points import original_colors
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from cylx.results import Result
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,11 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.records import PointCloud, Scene
-
-FloatArray = NDArray[np.float64]
 
 COORDINATES_SAMPLED = 100_000
 """Coordinates that are looked at for the steps they are stored in."""

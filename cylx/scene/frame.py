@@ -10,19 +10,15 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.errors import InputError
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.bounding_box import box_of, extent_of, fill_scatter, widest_deviation
 from cylx.geometry.morton import BITS, morton_codes
 from cylx.records import Frame, Noise, Scene, cell_keys, stream
 from cylx.scene.noise import measure_surface
 from cylx.scene.noise_variation import noise_by_place, noise_by_size
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-
 
 STRAY = 40.0
 """A cloud this many times as wide as its points deviate from their mean may have strays: a few points far away."""

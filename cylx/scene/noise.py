@@ -8,14 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.morton import BITS, cell_starts, gather_ball
 from cylx.geometry.numerics import sort_in_place
 from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 NEIGHBOURHOODS_SAMPLED = 3000
 """Neighbourhoods looked at; the mode of their noise then scatters by about 4 %."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from cylx.geometry.arrays import FloatArray
 
 MAD_SHRINKAGE = 0.93
 """What the median absolute deviation of 48 quadric residuals shows of a Gaussian's standard deviation, as a share."""

@@ -9,11 +9,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.morton import BITS, cell_starts, gather_ball
 from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 MOST_NOISE_FACTOR = 8.0
 """No place is taken for this many times noisier than usual: what scatters more is no surface."""

@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import InputError
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.records import Crop, PointCloud, Selection
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-MaskArray = NDArray[np.bool_]
 _MOST_CELLS = float(1 << 52)  # along an axis: cells beyond could not be told apart
 _CLASSES = "classification"
 

@@ -12,22 +12,47 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.config import AveragingConfig
 from cylx.fits.conditioning import given_radius
 from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.fits.nominal_radius import Catalogue, choose_entry
 from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder, unbiased_radius
-from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, cylinder_coordinates, points_on
+from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, points_on
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Segment
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-
+MARGIN_OF_AVERAGE = 0.4
+"""Candidates speak for their places and this share of their extents to either side."""
 GROWTH_STEPS = 8
+"""Rounds of fitting and growing at most; a few suffice, because the height may double in each."""
+FIRST_STEPS, LATER_STEPS = 25, 12
+"""Gauss-Newton steps of the first fit, which starts from the rough average, and of the later ones."""
+FIRST_REACH, REACH_RADII, REACH_HALVES = 0.5, 1.5, 0.7
+"""How far beyond the ends points are taken: in radii before the first fit; later in radii or half heights, whichever
+is more, so that a long pipe grows as fast as a short one."""
+FIRST_SHELL, LATER_SHELL, LEAST_SHELL = 0.12, 0.05, 5.0
+"""Half width of the shell in which points have a say: in radii at first, in radii later, and at least in noises."""
+SHELL_MARGIN = 8.0
+"""Points are gathered this many noises beyond the shell: it moves with the fit."""
+LEAST_WIDTH = 3.0
+"""The width of the weights does not fall below this many noises: a Gaussian ends there."""
+SURFACE_WIDTH, MOST_SPREAD = 3.0, 2.0
+"""Points within so many deviations are on the surface; no deviation is taken for more than so many noises."""
+MOST_RADIUS_RATIO = 2.0
+"""A fit whose radius changes more than this has left the candidates it came from."""
+LEAST_POINTS_OF_AVERAGE = 20
+"""Without so many points five parameters are not fitted robustly."""
+SHORTEST_HALF = 0.1
+"""A cylinder has at least this half height, in radii."""
+SETTLED = 0.01
+"""Growth ends when half the height changes less than this share of itself and of the radius."""
+SHELL_OF_FIT, LEAST_SHELL_OF_FIT = 4.0, 0.02
+"""Half width of the shell of the last fits: in noises, and at least in radii, as real surfaces are no cylinders."""
+REFIT_STEPS, MOST_REFIT_STEPS = 15, 60
+"""Gauss-Newton steps of a fit to a sample of the points, and of one to all of them, which goes to its fixed point."""
 DOUBT_INSIDE = 0.4
 """A piece of the height that was found to belong before is asked for this share of what one beyond the ends is."""
 STRICT_FLATNESS, STRICT_FROM_RADIUS = 0.75, 5.0
@@ -81,7 +106,7 @@ def average_cluster(candidates: Candidates, cluster: Cluster, config: AveragingC
         axis /= np.linalg.norm(axis)
         point = move_points(motion, np.zeros(3)) + origin
     heights = (points - point) @ axis
-    margin = 0.4 * float(np.median(candidates.extents[cluster.members]))
+    margin = MARGIN_OF_AVERAGE * float(np.median(candidates.extents[cluster.members]))
     low, high = float(heights.min()) - margin, float(heights.max()) + margin
     model = np.concatenate([point + 0.5 * (low + high) * axis, axis, [weights @ candidates.radii[cluster.members]]])
     return Segment(model, 0.5 * (high - low), 0.0)
@@ -106,27 +131,27 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
     noise = indexed.noise_about(model, half)
     first = model
     for step in range(GROWTH_STEPS):
-        beyond = max(1.5 * model[RADIUS], 0.7 * half) if step else 0.5 * model[RADIUS]
-        shell = max(0.12 * model[RADIUS] if step == 0 else 0.05 * model[RADIUS], 5.0 * noise)
-        width = shell + 8.0 * noise
+        beyond = max(REACH_RADII * model[RADIUS], REACH_HALVES * half) if step else FIRST_REACH * model[RADIUS]
+        shell = max((LATER_SHELL if step else FIRST_SHELL) * model[RADIUS], LEAST_SHELL * noise)
+        width = shell + SHELL_MARGIN * noise
         strict = STRICT_FLATNESS if model[RADIUS] > STRICT_FROM_RADIUS else 1.0
         points = _own_points(indexed, model, half + beyond, width, ENOUGH_TO_JUDGE, strict)
-        if len(points) < 20:
+        if len(points) < LEAST_POINTS_OF_AVERAGE:
             return "too few points"
         stride = max(1, len(points) // ENOUGH_TO_GROW)
-        schedule = WeightSchedule(shell, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH_TOLERANCE)
+        schedule = WeightSchedule(shell, LEAST_WIDTH * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH_TOLERANCE)
         end = FIT_BEYOND_ENDS * half
-        fit = fit_cylinder(points[::stride], model, low=-end, high=end, schedule=schedule, steps=12 if step else 25)
+        fit = fit_cylinder(
+            points[::stride], model, low=-end, high=end, schedule=schedule, steps=LATER_STEPS if step else FIRST_STEPS
+        )
         if fit is None:
             return "no fit"
         model, spread = fit
-        if (
-            not (0.5 * first[RADIUS] <= model[RADIUS] <= 2.0 * first[RADIUS])
-            or abs(model[DIRECTION] @ first[DIRECTION]) < LEAST_COSINE
-        ):
+        alike = first[RADIUS] / MOST_RADIUS_RATIO <= model[RADIUS] <= MOST_RADIUS_RATIO * first[RADIUS]
+        if not alike or abs(model[DIRECTION] @ first[DIRECTION]) < LEAST_COSINE:
             return "drifted away"
         spread = TUKEY_SPREAD * spread
-        heights, angles = points_on(points, model, 3.0 * min(max(spread, noise), 2.0 * noise))
+        heights, angles = points_on(points, model, SURFACE_WIDTH * min(max(spread, noise), MOST_SPREAD * noise))
         found = visible_extent(heights, angles, half, model[RADIUS], doubt=DOUBT_INSIDE if step else 1.0)
         if found is None:
             return "too few points"
@@ -134,9 +159,9 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
         before = half
         half = 0.5 * (high - low)
         model[POINT] += 0.5 * (low + high) * model[DIRECTION]
-        if half < 0.1 * model[RADIUS]:
+        if half < SHORTEST_HALF * model[RADIUS]:
             return "too short"
-        if step and abs(half - before) < 0.01 * before + 0.01 * model[RADIUS]:
+        if step and abs(half - before) < SETTLED * before + SETTLED * model[RADIUS]:
             break
     return refit(Segment(model, half, noise), indexed, most=ENOUGH_TO_JUDGE)
 
@@ -156,7 +181,9 @@ def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> S
     Segment or str
         With the bias of the radius taken off; or why there is none.
     """
-    fit = _robust_fit(*_shell(segment, indexed, most), segment, indexed, steps=15 if most else 60)
+    fit = _robust_fit(
+        *_shell(segment, indexed, most), segment, indexed, steps=REFIT_STEPS if most else MOST_REFIT_STEPS
+    )
     if fit is None:
         return "no fit"
     model, spread = fit
@@ -206,7 +233,7 @@ def finish(
         is none.
     """
     points, width = _shell(segment, indexed, None)
-    fit = _robust_fit(points, width, segment, indexed, steps=15, tolerance=ROUGH_TOLERANCE)
+    fit = _robust_fit(points, width, segment, indexed, steps=REFIT_STEPS, tolerance=ROUGH_TOLERANCE)
     if fit is None:
         return "no fit"
     model, spread = fit
@@ -261,7 +288,7 @@ def _turn_as_given(model: FloatArray) -> None:
 
 def _shell(segment: Segment, indexed: IndexedCloud, most: int | None) -> tuple[FloatArray, float]:
     """Give the points about the surface of a segment, and how near to it those lie that have a say at first."""
-    width = max(4.0 * indexed.noise_about(segment.model, segment.half), 0.02 * segment.radius)
+    width = max(SHELL_OF_FIT * indexed.noise_about(segment.model, segment.half), LEAST_SHELL_OF_FIT * segment.radius)
     return _own_points(indexed, segment.model, FIT_BEYOND_ENDS * segment.half, 2.0 * width, most), width
 
 
@@ -270,50 +297,11 @@ def _robust_fit(
 ) -> tuple[FloatArray, float] | None:
     """Fit a cylinder to the points of a segment; give it and the standard deviation about it."""
     noise, end = indexed.noise_about(segment.model, segment.half), FIT_BEYOND_ENDS * segment.half
-    schedule = WeightSchedule(width, 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD, tolerance)
-    if len(points) < 20:
+    schedule = WeightSchedule(width, LEAST_WIDTH * noise, 1.0, TUKEY * TUKEY_SPREAD, tolerance)
+    if len(points) < LEAST_POINTS_OF_AVERAGE:
         return None
     fit = fit_cylinder(points, segment.model, low=-end, high=end, schedule=schedule, steps=steps)
     return None if fit is None else (fit[0], fit[1] * TUKEY_SPREAD)
-
-
-def measure_extent(segment: Segment, indexed: IndexedCloud) -> Segment | str:
-    """Find the visible extent of a cylinder that is left as the candidates averaged it.
-
-    Parameters
-    ----------
-    segment : Segment
-    indexed : IndexedCloud
-
-    Returns
-    -------
-    Segment or str
-        The same axis and radius with its own middle, height and spread, or why there is none.
-    """
-    model, radius = segment.model, segment.radius
-    reach = max(segment.half, radius) * 4.0
-    # the average is as good as its candidates, so its surface is looked for in a wider shell than a fitted one's
-    width = max(5.0 * indexed.noise_about(model, segment.half), 0.05 * radius)
-    half = max(segment.half, 0.5 * radius)
-    low = high = 0.0
-    heights = distances = np.empty(0)
-    for _ in range(GROWTH_STEPS):
-        near = indexed.cells.near_cylinder(model, -reach, reach, max(0.0, radius - width), radius + width)
-        near = near[indexed.may_be_on(near, radius)]
-        heights, distances, angles = cylinder_coordinates(indexed.points[near], model[POINT], model[DIRECTION])
-        found = visible_extent(heights, angles, half, radius)
-        if found is None:
-            return "too few points"
-        low, high = found
-        if max(-low, high) < 0.95 * reach:
-            break
-        reach *= 2.0
-    if high - low < 0.2 * radius:
-        return "too short"
-    on = (heights >= low) & (heights <= high)
-    spread = 1.4826 * float(np.median(np.abs(distances[on] - radius)))
-    moved = np.concatenate([model[POINT] + 0.5 * (low + high) * model[DIRECTION], model[3:]])
-    return Segment(moved, 0.5 * (high - low), spread)
 
 
 def _own_points(

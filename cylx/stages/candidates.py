@@ -10,12 +10,10 @@ from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import RADIUS
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 MOST_POINTS_TO_POLISH = 4096
 """Most points a candidate is polished on."""

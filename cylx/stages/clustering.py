@@ -10,15 +10,12 @@ import heapq
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.config import ClusteringConfig
 from cylx.game import SparsePayoff, evolve, local_payoff, screw_payoff
 from cylx.game.agreement import Neighbourhood
+from cylx.geometry.arrays import IndexArray
 from cylx.records import Candidates, Cluster, Segment, StageReport
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 LEAST_SHARE_OF_MEMBER = 0.35
 """Everybody whose payoff against the equilibrium exceeds this share of the mean belongs to the cluster."""
@@ -26,6 +23,20 @@ MOST_CANDIDATES_OF_POPULATION = 400
 """Most candidates of a local population, the best connected ones."""
 
 
+SURVIVING_SHARE = 1e-3
+"""Where all play, a candidate with less than this part of an equal share is on its way out: the dynamics never end."""
+LEAST_WEIGHT = 0.05
+"""Members without a share of the population weigh this part of the largest share in the average."""
+CLOSELY = 0.1, 4.0, 0.06
+"""What says the same as a cylinder: offset in radii, angle in degrees, relative difference of radii."""
+EXPLAINED = 0.25, 10.0, 0.2
+"""What a cylinder accounts for: candidates of a few points that lie on it scatter so much about it."""
+STALE = 1e-9
+"""A degree in the heap is up to date but for rounding."""
+STOP_SHARE = 0.5
+"""The game ends where nobody has this part of the payoff that the smallest cluster accepted would give."""
+RADIUS_STEP = 1.25
+"""Ratio of the radii of neighbouring cells in which candidates say the same."""
 SMALL_CLUSTERS_TO_END = 3
 """Where all play, this many small clusters in a row end it: the paper says only "until all are extracted"."""
 
@@ -90,7 +101,7 @@ class CandidateGame:
             fitness = block @ population
             mean = float(population @ fitness)
             # the paper's winners are those with a share; here also whoever does well against them
-            members = population > (0.0 if not whole else 1.0 / len(nodes) * 1e-3)
+            members = population > (0.0 if not whole else 1.0 / len(nodes) * SURVIVING_SHARE)
             if not whole:
                 members |= fitness > LEAST_SHARE_OF_MEMBER * mean
             self.withdraw(nodes[members])
@@ -102,7 +113,7 @@ class CandidateGame:
             else:
                 self._patience = SMALL_CLUSTERS_TO_END
                 self._clusters += 1
-                weights = population[members] + (0.0 if whole else 0.05 * population.max())
+                weights = population[members] + (0.0 if whole else LEAST_WEIGHT * population.max())
                 return Cluster(nodes[members], weights / weights.sum(), mean)
             self._patience -= 1 if whole else 0
             if self._patience == 0:
@@ -117,8 +128,7 @@ class CandidateGame:
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
         """Give the candidates still in the game that a cylinder accounts for, or that say closely the same."""
-        limits = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
-        return self._places.agreeing(segment, self._alive, *limits)
+        return self._places.agreeing(segment, self._alive, *(CLOSELY if closely else EXPLAINED))
 
     def report(self) -> StageReport:
         """Count the candidates that came in, the clusters, and what was dropped."""
@@ -127,12 +137,12 @@ class CandidateGame:
 
     def _neighbourhood(self) -> IndexArray | None:
         """Give the best connected candidate that is left, and those it plays with."""
-        least = 0.5 * self._config.min_payoff * (self._config.min_support - 1)
+        least = STOP_SHARE * self._config.min_payoff * (self._config.min_support - 1)
         while self._heap:
             degree, i = heapq.heappop(self._heap)
             if not self._alive[i]:
                 continue
-            if -degree > self._degrees[i] + 1e-9:
+            if -degree > self._degrees[i] + STALE:
                 heapq.heappush(self._heap, (-float(self._degrees[i]), i))
                 continue
             if self._degrees[i] < least:
@@ -166,8 +176,8 @@ def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:
     """
     if len(candidates) == 0:
         return candidates
-    size_class = np.floor(np.log(candidates.radii) / math.log(1.25))
-    side = 0.5 * 1.25**size_class
+    size_class = np.floor(np.log(candidates.radii) / math.log(RADIUS_STEP))
+    side = 0.5 * RADIUS_STEP**size_class
     signs = np.where(
         candidates.directions[np.arange(len(candidates)), np.abs(candidates.directions).argmax(1)] < 0, -1, 1
     )

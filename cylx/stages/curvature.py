@@ -12,21 +12,17 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, UX, UZ
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.numerics import fill_basis
 from cylx.geometry.quadric import fit_plane, osculating_cylinder
 from cylx.records import CELL, Candidates, Explained, Frame, Scale, StageReport
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-MaskArray = NDArray[np.bool_]
-
-MOST_POINTS_OF_WINDOW = 2048
+WINDOW_CAPACITY = 2048
 """Most points of a window; thinned windows over one surface hold about 600."""
 FEW_SEEDS = 3000
 """Scales with fewer windows than this get them more closely."""
@@ -140,9 +136,9 @@ def _scan(
     planes: FloatArray,
     marks: MaskArray,
 ) -> None:
-    found = np.empty(MOST_POINTS_OF_WINDOW, np.int64)
-    around, inner = np.empty((3, MOST_POINTS_OF_WINDOW)), np.empty((3, MOST_POINTS_OF_WINDOW))
-    plane, local = np.empty((2, 3)), np.empty((4, MOST_POINTS_OF_WINDOW))
+    found = np.empty(WINDOW_CAPACITY, np.int64)
+    around, inner = np.empty((3, WINDOW_CAPACITY)), np.empty((3, WINDOW_CAPACITY))
+    plane, local = np.empty((2, 3)), np.empty((4, WINDOW_CAPACITY))
     matrix, vectors = np.empty((6, 6)), np.empty((3, 3))
     right, axes = np.empty(6), np.empty((2, 3))
     quality = np.empty(3)

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.config import EllipsesConfig
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.ellipse import Degenerate, search_ellipse
 from cylx.records import EllipseFit, Slice
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 
 def fit_ellipses(

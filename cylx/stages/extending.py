@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
 
-FloatArray = NDArray[np.float64]
 Judge = Callable[[Segment, Finding], Finding | None]
 
 EXTENSION_ROUNDS = 6

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.records import IndexedCloud, Segment
-
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
 
 
 def label_points(segments: list[Segment], indexed: IndexedCloud) -> tuple[NDArray[np.int32], FloatArray]:

@@ -12,10 +12,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.config import SlicingConfig
 from cylx.fits.robust import move_to_foot, polish
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.circle import search_circle
 from cylx.geometry.cylinder import RADIUS, UX
 from cylx.geometry.ellipse import conic_shape, search_conic
@@ -24,10 +24,7 @@ from cylx.geometry.morton import gather_ball
 from cylx.geometry.numerics import fill_basis
 from cylx.records import Candidates, Explained, Frame, Scale
 
-FloatArray = NDArray[np.float64]
-IndexArray = NDArray[np.int64]
-
-MOST_POINTS_OF_WINDOW = 2048
+WINDOW_CAPACITY = 2048
 """Most points of a window."""
 SAMPLES = 48
 """Samples of five points a slice."""
@@ -156,12 +153,8 @@ def _slice_windows(
     rows: FloatArray,
     counts: IndexArray,
 ) -> None:
-    found, around, alone = (
-        np.empty(MOST_POINTS_OF_WINDOW, np.int64),
-        np.empty((3, MOST_POINTS_OF_WINDOW)),
-        np.empty((3, MOST_POINTS_OF_WINDOW)),
-    )
-    flat, samples = np.empty((2, MOST_POINTS_OF_WINDOW)), np.empty((SAMPLES, 5), np.int64)
+    found, samples = np.empty(WINDOW_CAPACITY, np.int64), np.empty((SAMPLES, 5), np.int64)
+    around, alone, flat = np.empty((3, WINDOW_CAPACITY)), np.empty((3, WINDOW_CAPACITY)), np.empty((2, WINDOW_CAPACITY))
     model, normal, basis, shape, quality = np.empty(7), np.empty(3), np.empty((2, 3)), np.empty(5), np.empty(3)
     for s in range(len(seeds)):
         seed, noise, state = points[seeds[s]], noises[s], (draws[s] & 0x7FFFFFFFFFFFFFFF) | 1

@@ -6,19 +6,34 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
 
-FloatArray = NDArray[np.float64]
-
 LEAST_COSINE_OF_PIECES = math.cos(math.radians(8.0))
-LEAST_COSINE_OF_THE_SAME = math.cos(math.radians(4.0))
+"""Axes of two pieces of one pipe differ less; the rest is decided by a fit to both."""
+LEAST_COSINE_OF_THE_SAME, MOST_RADIUS_DIFFERENCE, MOST_OFFSET_OF_THE_SAME = math.cos(math.radians(4.0)), 0.1, 0.15
+"""A segment that differs less from one that is known, in direction, relative radius and offset in radii, is the same."""
+HALF = 7
+"""Where rows of segments have half the height."""
 LEAST_RADIUS_RATIO = 0.75
-MOST_OFFSET_OF_PIECES = 0.3
-"""Axes further apart than this, in radii, and four standard deviations are those of two pipes."""
+"""Radii of two pieces of one pipe differ less."""
+MOST_OFFSET_OF_PIECES, ERRORS_OF_OFFSET = 0.3, 4.0
+"""Axes further apart than this, in radii, and so many standard deviations are those of two pipes."""
+FAR_APART = 2.0
+"""Pieces with a gap of so many of their lengths between them are far apart."""
+SHELL_RADII, SHELL_NOISES, LEAST_WIDTH = 0.1, 5.0, 3.0
+"""Half width of the weights at the start of a common fit, in radii or noises, whichever is more, and at its end, in
+noises: the pieces may lie as far off a common cylinder as their errors say."""
+FIT_STEPS = 30
+MOST_SPREAD_RATIO = 1.1
+"""A common fit about which the points scatter more than this, compared with those of the pieces, explains less."""
+SURFACE_WIDTH, MOST_SPREAD = 3.0, 2.0
+"""Points within so many deviations are on the surface; no deviation is taken for more than so many noises."""
+LEAST_SHARES_EXPLAINED = 0.9, 0.8
+"""Shares of the points of the larger and the smaller piece that must be on the common surface."""
 LOST_BEYOND_ERROR = 1.0
 """If the error is more than this many radii, a piece no longer says where its pipe goes on: that may be another, unless
 there are points between the two."""
@@ -82,7 +97,7 @@ def _first_join(pool: list[Finding], i: int, indexed: IndexedCloud, judge: Judge
     apart = np.linalg.norm(across - heights[:, None] * one[DIRECTION], axis=1)
     offsets = np.array([finding.offset_error for finding in rest])
     errors = np.sqrt(pool[i].offset_error ** 2 + offsets**2 + (pool[i].tilt_error * heights) ** 2)
-    alike &= apart <= MOST_OFFSET_OF_PIECES * one[RADIUS] + 4.0 * errors
+    alike &= apart <= MOST_OFFSET_OF_PIECES * one[RADIUS] + ERRORS_OF_OFFSET * errors
     for k in np.flatnonzero(alike):
         joined = _join(pool[i], rest[k], float(errors[k]), indexed, judge)
         if joined is not None:
@@ -104,16 +119,14 @@ def is_part_of(segment: Segment, known: FloatArray) -> bool:
     known : ndarray of shape (n, 8)
         From `as_rows`.
     """
-    model, radii = segment.model, known[:, RADIUS]
-    alike = (np.abs(known[:, DIRECTION] @ model[DIRECTION]) >= LEAST_COSINE_OF_THE_SAME) & (
-        np.abs(model[RADIUS] / radii - 1.0) <= 0.1
-    )
+    alike = np.abs(known[:, DIRECTION] @ segment.direction) >= LEAST_COSINE_OF_THE_SAME
+    alike &= np.abs(segment.radius / known[:, RADIUS] - 1.0) <= MOST_RADIUS_DIFFERENCE
     known = known[alike]
-    across = model[POINT] - known[:, POINT]
+    across = segment.point - known[:, POINT]
     heights = (across * known[:, DIRECTION]).sum(axis=1)
     apart = np.linalg.norm(across - heights[:, None] * known[:, DIRECTION], axis=1)
-    along = np.abs(heights) + 0.5 * segment.half < known[:, 7] + 0.5 * known[:, RADIUS]
-    return bool(((apart < 0.15 * known[:, RADIUS]) & along).any())
+    along = np.abs(heights) + 0.5 * segment.half < known[:, HALF] + 0.5 * known[:, RADIUS]
+    return bool(((apart < MOST_OFFSET_OF_THE_SAME * known[:, RADIUS]) & along).any())
 
 
 def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
@@ -163,7 +176,7 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
     across = two.point - one.point
     height = float(across @ one.direction)
     gap, model = abs(height) - one.half - two.half, one.model.copy()
-    far = gap > 2.0 * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
+    far = gap > FAR_APART * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
     if far:
         if error > MOST_ERROR_OF_PIECES * one.radius or not _point_at_each_other(a, b):
             return None
@@ -173,17 +186,18 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
     half = 0.5 * (high - low)
     end = FIT_BEYOND_ENDS * half
     noise = indexed.noise_about(one.model, one.half)
-    schedule = WeightSchedule(max(0.1 * model[RADIUS], 5.0 * noise), 3.0 * noise, 1.0, TUKEY * TUKEY_SPREAD)
+    shell = max(SHELL_RADII * model[RADIUS], SHELL_NOISES * noise)
+    schedule = WeightSchedule(shell, LEAST_WIDTH * noise, 1.0, TUKEY * TUKEY_SPREAD)
     pieces = [indexed.points[finding.points[:: 1 + len(finding.points) // ENOUGH_OF_EACH_PIECE]] for finding in (a, b)]
-    fit = fit_cylinder(np.concatenate(pieces), model, low=-end, high=end, schedule=schedule, steps=30)
+    fit = fit_cylinder(np.concatenate(pieces), model, low=-end, high=end, schedule=schedule, steps=FIT_STEPS)
     if fit is None:
         return None
     model, spread = fit
     spread *= TUKEY_SPREAD
-    if spread > 1.1 * max(one.spread, two.spread, noise):
+    if spread > MOST_SPREAD_RATIO * max(one.spread, two.spread, noise):
         return None
-    width = 3.0 * max(min(spread, 2.0 * noise), noise)
-    for piece, share in zip(pieces, (0.9, 0.8), strict=True):
+    width = SURFACE_WIDTH * max(min(spread, MOST_SPREAD * noise), noise)
+    for piece, share in zip(pieces, LEAST_SHARES_EXPLAINED, strict=True):
         offsets = piece - model[POINT]
         along = offsets @ model[DIRECTION]
         distances = np.sqrt(np.maximum((offsets**2).sum(axis=1) - along**2, 0.0))

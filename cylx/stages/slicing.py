@@ -7,11 +7,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import SlicingConfig
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import canonical_direction
 from cylx.geometry.plane import Plane, random_directions
 from cylx.records import Frame, Slice, stream
-
-FloatArray = NDArray[np.float64]
 
 
 def draw_planes(frame: Frame, config: SlicingConfig, seed: int, axis: list[float] | None = None) -> list[Plane]:

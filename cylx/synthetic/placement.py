@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.errors import UsageError
+from cylx.geometry.arrays import FloatArray
 from cylx.synthetic.surfaces import random_directions
-
-FloatArray = NDArray[np.float64]
 
 _ATTEMPTS = 4000
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder
 from cylx.synthetic.placement import Room
 from cylx.synthetic.scene import NOISE, OTHER_SURFACE, SyntheticScene, demand, true_cylinder
 from cylx.synthetic.surfaces import Box, Frustum, Mantle, Sphere, Surface, Wall
-
-FloatArray = NDArray[np.float64]
 
 _OBJECTS_A_ROOM = 10  # fit at ease into a room 12.5 largest radii wide; more objects get a larger one
 _WIDTH_IN_RADII = 12.5

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import UsageError
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder, cylinder_coordinates
-
-FloatArray = NDArray[np.float64]
 
 OTHER_SURFACE = -1
 NOISE = -2

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder, axis_basis
-
-FloatArray = NDArray[np.float64]
 
 
 class Surface(Protocol):
