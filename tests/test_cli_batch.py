@@ -12,7 +12,7 @@ import pytest
 from conftest import POINTS
 from test_cli_extract import on_a_terminal
 
-from cylx.cli.batch.memory import memory_available
+from cylx.cli.batch.memory import free_memory
 from cylx.cli.batch.options import BatchOptions
 from cylx.cli.batch.scans import find_scans
 from cylx.cli.batch.summary import COLUMNS, table_text
@@ -474,7 +474,7 @@ def test_one_scan_is_done_here_whatever_the_jobs(run_cylx, scans, pipeline):
     [(None, 1e9, None), (3, 1e6, 3), (9, 1e9, 4), (0, 0.9e9, 3), (0, 1e5, 1), (0, None, 4)],
 )
 def test_jobs_are_as_many_as_there_is_room_for(monkeypatch, jobs, available, processes):
-    monkeypatch.setattr("cylx.cli.batch.options.memory_available", lambda: available)
+    monkeypatch.setattr("cylx.cli.batch.options.free_memory", lambda: available)
     monkeypatch.setattr("cylx.cli.batch.options.cores", lambda: 8)
     assert BatchOptions(None, False, jobs, False, None).processes(list("abcd")) == processes
     assert Processes().convert("auto", None, None) == 0
@@ -503,7 +503,7 @@ def test_memory_is_what_the_system_and_the_container_leave(tmp_path, monkeypatch
         (tmp_path / name).write_text(text)
     monkeypatch.setattr("cylx.cli.batch.memory.MEMINFO", tmp_path / "meminfo")
     monkeypatch.setattr("cylx.cli.batch.memory.CONTAINER", tmp_path)
-    assert memory_available() == available
+    assert free_memory() == available
 
 
 LAS = bytearray(375)

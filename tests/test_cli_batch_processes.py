@@ -138,7 +138,7 @@ def most_at_once(spans):
 
 @pytest.mark.parametrize(("available", "needs", "most"), [(100, 90, 1), (200, 90, 2), (10, 90, 1), (None, 90, 2)])
 def test_memory_decides_how_many_work_at_once(monkeypatch, available, needs, most):
-    monkeypatch.setattr(workers, "memory_available", lambda: available)
+    monkeypatch.setattr(workers, "free_memory", lambda: available)
     monkeypatch.setattr(workers, "memory_held", lambda process: 0)
     spans = outcome([SLEEP] * 4, needs=[needs] * 4).values()
     assert most_at_once(spans) <= most
@@ -158,7 +158,7 @@ def test_those_that_are_no_longer_needed_end():
 
 
 def test_memory_is_told_or_unknown():
-    assert memory.memory_available() is None or memory.memory_available() > 1e6
+    assert memory.free_memory() is None or memory.free_memory() > 1e6
     assert memory.memory_held(os.getpid()) == 0 or memory.memory_held(os.getpid()) > 1e6
     assert memory.memory_held(999999999) == 0
     assert memory.cores() >= 1

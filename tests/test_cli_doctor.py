@@ -134,4 +134,4 @@ def test_it_checks_what_the_package_needs_and_offers():
         name.lower() for name in doctor.NEEDED
     }
     offered = set(metadata("cylx").get_all("Provides-Extra")) - {"test", "lint", "bench", "docs"}
-    assert offered <= {extra for extra, _ in doctor.OPTIONAL.values()}
+    assert offered <= {extra for extra, _ in doctor.LIBRARIES.values()}

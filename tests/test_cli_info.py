@@ -113,7 +113,7 @@ def test_a_cloud_without_shape_is_unusable_in_the_json(run_cylx, tmp_path):
 def test_memory_that_may_not_suffice_is_told_of(run_cylx, tmp_path, scene, monkeypatch, available, scarce):
     path = tmp_path / "can.xyz"
     write_cloud(path, scene.points, properties=None)
-    monkeypatch.setattr("cylx.cli.info.memory_available", lambda: available)
+    monkeypatch.setattr("cylx.cli.info.free_memory", lambda: available)
     fault = "'cylx extract' takes about 0.25 GB, and 0.001 GB are free; take a part of the scan by --crop or --voxel"
     shown = run_cylx("info", path)
     assert (shown.exit_code, shown.stderr) == (0, f"warning: {path}: {fault}\n" if scarce else "")

@@ -17,9 +17,11 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from cylx.cli.batch.memory import free_memory
 from cylx.cli.options.configuration import debug_option, json_option
 from cylx.cli.terminal.failures import answer
 from cylx.cli.terminal.group import ExampleCommand
+from cylx.optional.extras import LIBRARIES
 from cylx.version import __version__
 
 if TYPE_CHECKING:
@@ -31,18 +33,6 @@ OLDEST = 10
 """Minor version of Python 3."""
 NEEDED = ("click", "numba", "numpy", "plyfile", "pydantic", "PyYAML", "rich", "scipy")
 """What cylx imports, as it is called on the package index."""
-OPTIONAL = {
-    "matplotlib": ("plots", "pictures of the experiments"),
-    "laspy": ("las", "LAS files"),
-    "lazrs": ("las", "LAZ files"),
-    "pye57": ("e57", "E57 files"),
-    "trimesh": ("mesh", "export of PLY, OBJ, GLB and STL"),
-    "OCP": ("step", "export of STEP"),
-    "ifcopenshell": ("ifc", "export of IFC"),
-    "ezdxf": ("dxf", "export of DXF"),
-    "pandas": ("dataframe", "data frames"),
-}
-"""What does not come with cylx, as it is imported: the extra that brings it, and what for."""
 PACKAGES = {"OCP": ("cadquery-ocp-novtk", "cadquery-ocp")}
 """Packages that are not called as they are imported."""
 TIGHT = 1 << 30
@@ -114,7 +104,7 @@ def diagnose(observer: Observer | None = None) -> list[Check]:
         check_libusb(),
         check_kernels(),
         check_machine(),
-        *(check_extra(name) for name in OPTIONAL if OPTIONAL[name][0] in extras_there_are()),
+        *(check_extra(name) for name in LIBRARIES if LIBRARIES[name].extra in extras_there_are()),
         check_extraction(observer),
     ]
 
@@ -197,9 +187,9 @@ def check_extra(name: str) -> Check:
     Parameters
     ----------
     name : str
-        A key of `OPTIONAL`.
+        A key of `LIBRARIES`.
     """
-    extra, purpose = OPTIONAL[name]
+    extra, purpose = LIBRARIES[name]
     found = next(filter(None, map(_version, PACKAGES.get(name, (name,)))), None)
     remedy = f"pip install 'cylx[{extra}]'"
     return _imported(name, lambda: import_module(name), found, remedy, purpose, needed=False)
@@ -227,18 +217,7 @@ def extras_there_are() -> set[str]:
     """Name the extras that the installed cylx has."""
     with suppress(PackageNotFoundError):
         return set(metadata("cylx").get_all("Provides-Extra") or ())
-    return {extra for extra, _ in OPTIONAL.values()}
-
-
-def free_memory() -> int | None:
-    """Give the memory that is free, bytes; None where the system does not say."""
-    with suppress(OSError):
-        for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
-            if line.startswith("MemAvailable:"):
-                return 1024 * int(line.split()[1])
-    with suppress(AttributeError, OSError, ValueError):
-        return os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    return None
+    return {extra for extra, _ in LIBRARIES.values()}
 
 
 def _imported(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from cylx.cli.batch.memory import memory_available, memory_for
+from cylx.cli.batch.memory import free_memory, memory_for
 from cylx.cli.options.configuration import complete_files, debug_option, json_option
 from cylx.cli.options.selection import selecting
 from cylx.cli.terminal.failures import answer, tell
@@ -97,7 +97,7 @@ def _scarce_memory(needed: int) -> list[Caution]:
     """Notice that the extraction may not fit into the memory that is free now."""
     from cylx.scene.cautions import Caution
 
-    available = memory_available()
+    available = free_memory()
     if available is None or needed <= available:
         return []
     fault = f"'cylx extract' takes about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free"

@@ -10,6 +10,7 @@ from typing import cast
 
 from cylx.errors import OutputError, UsageError
 from cylx.export.drawing import Drawing, Exported
+from cylx.optional.extras import LIBRARIES, require
 
 METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048}
 """Length of each unit, metres."""
@@ -27,8 +28,6 @@ class Format:
         Module of this room that writes it.
     library : str or None
         What it needs; None if that comes with cylx.
-    extra : str or None
-        Name of the extra that brings the library.
     has_unit : bool
         Whether lengths have a unit in it.
     may_be_empty : bool
@@ -38,9 +37,13 @@ class Format:
     suffix: str
     home: str
     library: str | None = None
-    extra: str | None = None
     has_unit: bool = False
     may_be_empty: bool = False
+
+    @property
+    def extra(self) -> str | None:
+        """Name of the extra that brings the library."""
+        return None if self.library is None else LIBRARIES[self.library].extra
 
     def demand(self, place: str, unit: str | None) -> None:
         """Refuse what cannot be written: its library or the unit is missing.
@@ -60,27 +63,22 @@ class Format:
         if self.has_unit and unit is None:
             units = ", ".join(METRES)
             raise UsageError(place, f"{self.suffix} has a unit of length", f"give that of the scan by --units: {units}")
-        if self.library is None:
-            return
-        try:
-            import_module(self.library)
-        except ImportError:
-            remedy = f"pip install 'cylx[{self.extra}]'"
-            raise UsageError(place, f"{self.suffix} needs {self.library}, which is not installed", remedy) from None
+        if self.library is not None:
+            require(self.library, place=place, needed_by=self.suffix)
 
 
 FORMATS = {
     known.suffix: known
     for known in (
-        Format(".ply", "meshes", "trimesh", "mesh"),
-        Format(".obj", "meshes", "trimesh", "mesh"),
-        Format(".glb", "meshes", "trimesh", "mesh", has_unit=True),
-        Format(".stl", "meshes", "trimesh", "mesh"),
+        Format(".ply", "meshes", "trimesh"),
+        Format(".obj", "meshes", "trimesh"),
+        Format(".glb", "meshes", "trimesh", has_unit=True),
+        Format(".stl", "meshes", "trimesh"),
         Format(".csv", "csv_text", may_be_empty=True),
-        Format(".step", "step", "OCP", "step", has_unit=True),
-        Format(".stp", "step", "OCP", "step", has_unit=True),
-        Format(".ifc", "ifc", "ifcopenshell", "ifc", has_unit=True, may_be_empty=True),
-        Format(".dxf", "dxf", "ezdxf", "dxf", has_unit=True, may_be_empty=True),
+        Format(".step", "step", "OCP", has_unit=True),
+        Format(".stp", "step", "OCP", has_unit=True),
+        Format(".ifc", "ifc", "ifcopenshell", has_unit=True, may_be_empty=True),
+        Format(".dxf", "dxf", "ezdxf", has_unit=True, may_be_empty=True),
     )
 }
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.names import mended_names
-from cylx.optional.extras import require_extra
+from cylx.optional.extras import require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -83,7 +83,7 @@ def read_e57(source: Input, scan: int | None = None) -> NDArray[np.void]:
     """
     if source.head(8) != b"ASTM-E57":
         raise InputError(source.place, "is no E57: it does not begin with ASTM-E57", "give it its right suffix")
-    require_extra("e57", source.place)
+    require("pye57", place=source.place, needed_by="", error=InputError)
     from pye57 import E57, libe57  # noqa: PLC0415  an extra
 
     try:

@@ -13,7 +13,7 @@ from cylx.errors import InputError
 from cylx.io.las_header import LasFacts, las_header
 from cylx.io.names import mended_names
 from cylx.io.rows import short_of_points
-from cylx.optional.extras import require_extra
+from cylx.optional.extras import require
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -59,7 +59,8 @@ def read_las(source: Input) -> NDArray[np.void]:
         If this is no LAS, it is damaged or shorter than its header says, or laspy or lazrs is not installed.
     """
     facts = las_header(source)
-    require_extra("laz" if facts.compressed else "las", source.place)
+    libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
+    require(*libraries, place=source.place, needed_by="", error=InputError)
     with quiet_laspy(), _told_apart(source.place):
         return _read(source, facts)
 

@@ -90,7 +90,7 @@ def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
             yield sys.stdout.buffer
             sys.stdout.buffer.flush()
         elif stat.S_ISREG(_mode(path) or stat.S_IFREG):
-            with _moved_when_done(_target(path)) as file:
+            with _staged(_target(path), ".tmp") as temporary, temporary.open("xb") as file:
                 yield file
         else:
             with Path(path).open("wb") as file:
@@ -134,13 +134,9 @@ def moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[str | Path]:
         yield name
         return
     check_writable(name, overwrite=overwrite)
-    target = Path(os.path.realpath(name))
-    staged = temporary_beside(target, target.suffix)
-    try:
-        yield staged
-        staged.replace(target)
-    finally:
-        staged.unlink(missing_ok=True)
+    target = _target(name)
+    with _staged(target, target.suffix) as temporary:
+        yield temporary
 
 
 def write_together(contents: Mapping[str, bytes], *, overwrite: bool) -> None:
@@ -208,15 +204,14 @@ def _has_ended(process: int) -> bool:
 
 
 @contextmanager
-def _moved_when_done(target: Path) -> Iterator[BinaryIO]:
-    temporary = temporary_beside(target, ".tmp")
+def _staged(target: Path, suffix: str) -> Iterator[Path]:
+    """Give a temporary name, which becomes that of `target` if all goes well."""
+    temporary = temporary_beside(target, suffix)
     try:
-        with temporary.open("xb") as file:
-            yield file
+        yield temporary
         temporary.replace(target)
-    except BaseException:
+    finally:
         temporary.unlink(missing_ok=True)
-        raise
 
 
 def _target(path: str | Path) -> Path:

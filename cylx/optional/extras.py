@@ -1,30 +1,73 @@
-"""Libraries that are installed only by those who need them."""
+"""Libraries that are installed only by those who need them: which extra brings each, and what to say without it."""
 
 from __future__ import annotations
 
-from importlib.util import find_spec
+from importlib import import_module
+from typing import NamedTuple
 
-from cylx.errors import InputError
-
-_NEEDS = {"las": ("las", ("laspy",)), "laz": ("las", ("laspy", "lazrs")), "e57": ("e57", ("pye57",))}
+from cylx.errors import CylxError, UsageError
 
 
-def require_extra(kind: str, place: str) -> None:
-    """Refuse an input whose format needs libraries that are not there.
+class Library(NamedTuple):
+    """A library that does not come with cylx.
 
     Parameters
     ----------
-    kind : {"las", "laz", "e57"}
+    extra : str
+        The extra that brings it.
+    purpose : str
+        What it is for.
+    """
+
+    extra: str
+    purpose: str
+
+
+LIBRARIES = {
+    "matplotlib": Library("plots", "pictures of the experiments"),
+    "laspy": Library("las", "LAS files"),
+    "lazrs": Library("las", "LAZ files"),
+    "pye57": Library("e57", "E57 files"),
+    "trimesh": Library("mesh", "export of PLY, OBJ, GLB and STL"),
+    "OCP": Library("step", "export of STEP"),
+    "ifcopenshell": Library("ifc", "export of IFC"),
+    "ezdxf": Library("dxf", "export of DXF"),
+    "pandas": Library("dataframe", "data frames"),
+}
+"""By the names that they are imported by."""
+
+
+def require(*libraries: str, place: str, needed_by: str | None = None, error: type[CylxError] = UsageError) -> None:
+    """Refuse what needs libraries that are not there, and name the command that installs them.
+
+    Parameters
+    ----------
+    *libraries : str
+        Keys of `LIBRARIES`, all of one extra.
     place : str
-        The input.
+        What the error is about: an input, an output.
+    needed_by : str, optional
+        What needs them, if the error shall say so; it may be empty where the place says it.
+    error : type
+        An error of an input, or of usage.
 
     Raises
     ------
-    InputError
-        If one of them is not installed.
+    CylxError
+        If one of them cannot be imported.
     """
-    extra, modules = _NEEDS[kind]
-    missing = [name for name in modules if find_spec(name) is None]
-    if missing:
-        fault = f"needs {' and '.join(missing)}, which {'is' if len(missing) == 1 else 'are'} not installed"
-        raise InputError(place, fault, f"pip install 'cylx[{extra}]'")
+    missing = [name for name in libraries if not _is_there(name)]
+    if not missing:
+        return
+    fault = f"{'is' if len(missing) == 1 else 'are'} not installed"
+    names = " and ".join(missing)
+    fault = f"{names} {fault}" if needed_by is None else f"{needed_by} needs {names}, which {fault}".strip()
+    raise error(place, fault, f"pip install 'cylx[{LIBRARIES[missing[0]].extra}]'")
+
+
+def _is_there(library: str) -> bool:
+    try:
+        import_module("matplotlib.figure" if library == "matplotlib" else library)
+    except ImportError:
+        return False
+    return True

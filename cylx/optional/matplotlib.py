@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 from typing import TYPE_CHECKING, Literal
 
-from cylx.errors import UsageError
+from cylx.optional.extras import require
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,10 +19,7 @@ def check_pictures() -> None:
     UsageError
         If matplotlib is not installed.
     """
-    try:
-        import matplotlib.figure  # noqa: F401, PLC0415  an extra
-    except ImportError:
-        raise UsageError("the picture", "matplotlib is not installed", "pip install 'cylx[plots]'") from None
+    require("matplotlib", place="the picture")
 
 
 def new_figure(inches: tuple[float, float], dpi: int, *, layout: Literal["constrained"] | None = None) -> Figure:

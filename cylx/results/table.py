@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from cylx.errors import UsageError
+from cylx.optional.extras import require
 
 _ALWAYS = (
     "id",
@@ -57,10 +57,9 @@ def dataframe_of(cylinders: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
     UsageError
         If pandas is not installed.
     """
-    try:
-        import pandas  # noqa: PLC0415  an extra
-    except ImportError:
-        raise UsageError("the data frame", "pandas is not installed", "pip install 'cylx[dataframe]'") from None
+    require("pandas", place="the data frame")
+    import pandas  # noqa: PLC0415  an extra
+
     return pandas.DataFrame(table_of(cylinders))
 
 

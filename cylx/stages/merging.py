@@ -15,7 +15,7 @@ from cylx.records import Finding, IndexedCloud, Segment
 LEAST_COSINE_OF_PIECES = math.cos(math.radians(8.0))
 """Axes of two pieces of one pipe differ less; the rest is decided by a fit to both."""
 LEAST_COSINE_OF_THE_SAME, MOST_RADIUS_DIFFERENCE, MOST_OFFSET_OF_THE_SAME = math.cos(math.radians(4.0)), 0.1, 0.15
-"""A segment that differs less from one that is known, in direction, relative radius and offset in radii, is the same."""
+"""A segment that differs less from a known one, in direction, relative radius and offset in radii, is the same."""
 HALF = 7
 """Where rows of segments have half the height."""
 LEAST_RADIUS_RATIO = 0.75

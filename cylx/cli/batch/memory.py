@@ -25,7 +25,7 @@ def memory_for(points: int) -> int:
     return BASE + A_POINT * points
 
 
-def memory_available() -> float | None:
+def free_memory() -> float | None:
     """Give the memory that programs can have without swapping, bytes; None where the system does not tell."""
     found = re.search(r"^MemAvailable:\s*(\d+) kB", _read(MEMINFO), re.MULTILINE)
     if found is None:

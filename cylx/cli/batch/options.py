@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from cylx.cli.batch.jobs import is_folder, is_slashed
-from cylx.cli.batch.memory import cores, memory_available, memory_needed
+from cylx.cli.batch.memory import cores, free_memory, memory_needed
 from cylx.cli.batch.summary import LIST, TABLE
 from cylx.errors import OutputError, UsageError
 
@@ -75,7 +75,7 @@ class BatchOptions(NamedTuple):
             return None
         if self.jobs != AUTO:
             return min(self.jobs, len(scans))
-        available, room, most = memory_available(), 0, min(cores(), len(scans))
+        available, room, most = free_memory(), 0, min(cores(), len(scans))
         for need in sorted(map(memory_needed, scans), reverse=True)[:most]:
             if available is not None and need > available:
                 break

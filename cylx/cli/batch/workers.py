@@ -17,7 +17,7 @@ from multiprocessing.connection import Connection, wait
 from types import FrameType
 from typing import Generic, NamedTuple, NoReturn, TypeVar
 
-from cylx.cli.batch.memory import memory_available, memory_held
+from cylx.cli.batch.memory import free_memory, memory_held
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
@@ -91,7 +91,7 @@ class Workers(Generic[Task, Answer]):
 
     def _fits(self, index: int, needs: Sequence[int]) -> bool:
         """Say whether there is memory for another task beside those that are worked on; the first has no choice."""
-        available = memory_available() if self._busy else None
+        available = free_memory() if self._busy else None
         if available is None:
             return True
         ours = sum(memory_held(worker.pid) for worker in (*self._busy.values(), *self._idle))
