@@ -13,6 +13,7 @@ from cylx.moved import follow_old_names
 from cylx.version import __version__
 
 if TYPE_CHECKING:
+    from cylx.api import evaluate as evaluate
     from cylx.api import extract as extract
     from cylx.api import read_result as read_result
     from cylx.api import to_dataframe as to_dataframe
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
     from cylx.config import load_config as load_config
     from cylx.errors import CylxError as CylxError
     from cylx.evaluation import compare as compare
-    from cylx.evaluation import evaluate as evaluate
     from cylx.geometry.cylinder import Cylinder as Cylinder
     from cylx.io import read_cloud as read_cloud
     from cylx.io import write_annotated as write_annotated
@@ -46,7 +46,7 @@ _HOMES = {
     "RejectedFit": "cylx.records",
     "Result": "cylx.results",
     "compare": "cylx.evaluation",
-    "evaluate": "cylx.evaluation",
+    "evaluate": "cylx.api",
     "extract": "cylx.api",
     "fit_cylinder": "cylx.pipeline.segmented",
     "load_config": "cylx.config",

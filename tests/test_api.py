@@ -172,3 +172,15 @@ def test_without_pandas_the_extra_is_named(make_extraction, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(UsageError, match=r"pandas is not installed; pip install 'cylx\[dataframe\]'"):
         cylx.to_dataframe(make_extraction())
+
+
+def test_what_is_evaluated_comes_in_any_form(make_extraction, tmp_path):
+    found = make_extraction()
+    path = tmp_path / "found.json"
+    path.write_text(cylx.Result.of(found).to_json(), encoding="utf-8")
+    expected = cylx.evaluate(cylx.to_dict(found), cylx.to_dict(found))
+    assert (expected.matched, expected.f1) == (2, 1.0)
+    for given in (found, cylx.Result.of(found), path, str(path)):
+        assert cylx.evaluate(given, cylx.to_dict(found)) == cylx.evaluate(cylx.to_dict(found), given) == expected
+    with pytest.raises(InputError, match="no such file"):
+        cylx.evaluate(tmp_path / "nothing.json", found)

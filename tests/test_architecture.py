@@ -18,7 +18,7 @@ MAY_IMPORT = {
         "api", "config", "errors", "evaluation", "experiments", "export", "io", "optional", "palette", "pipeline",
         "records", "report", "results", "scene", "synthetic", "version",
     },
-    "api": {"config", "geometry", "io", "pipeline", "records", "results", "scene", "stages"},
+    "api": {"config", "evaluation", "geometry", "io", "pipeline", "records", "results", "scene", "stages"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
         "baselines", "config", "errors", "fits", "game", "geometry", "records", "scene", "stages",

@@ -506,7 +506,9 @@ def test_the_line_goes_through_the_centres_of_the_best_ellipses(seed):
         normal = rng.standard_normal(3)
         plane = Plane(point + rng.standard_normal(3), normal / np.linalg.norm(normal))
         # put the centre on the axis, into a plane through it
-        plane = Plane(plane.point + plane.heights(point + height * direction) * plane.normal, plane.normal)
+        plane = Plane(
+            plane.point + ((point + height * direction - plane.point) @ plane.normal) * plane.normal, plane.normal
+        )
         center = plane.project(point + height * direction)
         best = EllipseFit(Ellipse(center, 20.0, 1.0 + k, 0.3), plane, 50)
         slices.append([EllipseFit(Ellipse(center + 5, 3.0, 2.0, 0.0), plane, 49), best] if k % 2 else [best])

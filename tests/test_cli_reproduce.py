@@ -9,7 +9,7 @@ import pytest
 from cylx.cli.options.configuration import METHODS
 from cylx.cli.reproduce import NUMBERS
 from cylx.experiments import FIGURES, Key, Outcome, header_line, parse_trials, trial_lines
-from cylx.experiments.figures import METHODS as CURVES
+from cylx.experiments.figures import CURVES
 
 VERTICES = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n"
 HEADER = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"

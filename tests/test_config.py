@@ -6,7 +6,8 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from cylx.config import Config, Section, check_tolerance, load_config, named_options, plain_yaml, preset_names
+from cylx.config import Config, Section, check_tolerance, load_config, named_options, plain_yaml
+from cylx.config.choices import PRESETS
 from cylx.config.faults import dotted_keys
 from cylx.config.yaml_reader import parse_yaml
 from cylx.config.yaml_writer import commented_yaml
@@ -62,8 +63,8 @@ def test_the_preset_may_come_from_any_layer(load):
 
 
 def test_the_presets_name_themselves():
-    assert preset_names() == ("auto", "paper")
-    assert [load_config(preset=name).preset for name in preset_names()] == ["auto", "paper"]
+    assert PRESETS == ("auto", "paper")
+    assert [load_config(preset=name).preset for name in PRESETS] == ["auto", "paper"]
 
 
 def test_a_later_override_wins():
@@ -345,7 +346,7 @@ def test_a_file_that_may_not_be_read_is_named(monkeypatch):
 
 
 @pytest.mark.parametrize("write", [commented_yaml, plain_yaml])
-@pytest.mark.parametrize("preset", preset_names())
+@pytest.mark.parametrize("preset", PRESETS)
 def test_what_is_written_loads_back(load, write, preset):
     config = load_config(preset=preset, overrides=["slicing.thickness=1e-7", "scene.radius_max=1e9", "max_cylinders=3"])
     assert load(write(config)) == config
@@ -367,7 +368,7 @@ def test_every_key_is_written_below_its_meaning():
 def test_the_published_schema_holds_for_what_is_written():
     schema = Config.model_json_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
-    for preset in preset_names():
+    for preset in PRESETS:
         jsonschema.validate(parse_yaml(commented_yaml(load_config(preset=preset)), "text"), schema)
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate({"slicing": {"thicknes": 1}}, schema)

@@ -28,7 +28,7 @@ from cylx.experiments import (
     trial_lines,
     trials,
 )
-from cylx.experiments.figures import METHODS, UNSURE, Cell
+from cylx.experiments.figures import CURVES, UNSURE, Cell
 from cylx.experiments.scans import cans_among_clutter, two_cans
 from cylx.experiments.study import bound_of
 from cylx.experiments.trials import config_of
@@ -71,12 +71,12 @@ def test_no_two_cells_are_at_one_place_and_a_file_can_tell_them_apart(figure):
 
 @pytest.mark.parametrize("figure", FIGURES.values(), ids=FIGURES)
 def test_each_place_has_all_methods_that_can_be_there(figure):
-    expected = {5: {"gt", "auto"}, 6: {"gt"}, 11: set(METHODS) - {"line-fit"}, 12: set(METHODS) - {"line-fit"}}
-    assert {cell.method for cell in figure.cells} == expected.get(figure.number, set(METHODS))
+    expected = {5: {"gt", "auto"}, 6: {"gt"}, 11: set(CURVES) - {"line-fit"}, 12: set(CURVES) - {"line-fit"}}
+    assert {cell.method for cell in figure.cells} == expected.get(figure.number, set(CURVES))
     if figure.number > 6:
         for panel, x in {(cell.panel, cell.x) for cell in figure.cells}:
             here = [cell for cell in figure.cells if (cell.panel, cell.x) == (panel, x) and cell.curve != UNSURE]
-            assert sorted(cell.method for cell in here) == sorted(expected.get(figure.number, METHODS))
+            assert sorted(cell.method for cell in here) == sorted(expected.get(figure.number, CURVES))
             assert len({cell.scene for cell in here}) == 1
             assert all(cell.curve == cell.method for cell in here)
 
@@ -122,7 +122,7 @@ def test_the_planes_are_the_papers():
 # trials
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", CURVES)
 def test_every_method_gives_finite_errors_and_the_same_twice(method):
     (cell,) = (cell for cell in FIGURES[9].cells if cell.method == method and cell.x == 360)
     cell = cell._replace(scene=tuple({**dict(cell.scene), "points": 1500}.items()))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from cylx.io import read_cloud, write_cloud
-from cylx.io.xyz import SUFFIXES
+from cylx.io.formats import TEXT_SUFFIXES
 
 FAR = np.array([[512345.678, 5412345.432, 123.4], [5e6 + 0.001, -5e6 - 0.002, 0.003], [1e-3, 0.1, 1 / 3]])
 
@@ -53,7 +53,7 @@ SAME = {
 
 
 @pytest.mark.parametrize("text", SAME.values(), ids=SAME)
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", TEXT_SUFFIXES)
 def test_ways_to_write_the_same(read, text, suffix):
     cloud = read(text, f"scan{suffix}")
     assert cloud.points.tolist() == [[1, 2, 3], [4, 5, 6]]
@@ -104,7 +104,7 @@ def test_names_in_a_comment_go_with_a_separator(read):
 
 @given(
     points=hnp.arrays("f8", st.tuples(st.integers(1, 9), st.just(3)), elements=st.floats(-1e9, 1e9)),
-    suffix=st.sampled_from(SUFFIXES),
+    suffix=st.sampled_from(TEXT_SUFFIXES),
     dtype=st.sampled_from(["f4", "f8"]),
 )
 def test_any_points_round_trip_bit_by_bit(tmp_path_factory, points, suffix, dtype):
@@ -113,7 +113,7 @@ def test_any_points_round_trip_bit_by_bit(tmp_path_factory, points, suffix, dtyp
     assert np.array_equal(read_cloud(path).points.astype(dtype), points.astype(dtype))
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", TEXT_SUFFIXES)
 def test_properties_come_back_under_their_names(tmp_path, suffix):
     path = tmp_path / f"scan{suffix}"
     write_cloud(path, FAR, properties={"label": np.array([-1, 0, 7], "i4"), "scan time": np.array([0.1, 2, 3])})

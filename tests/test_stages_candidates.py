@@ -62,9 +62,9 @@ def test_points_of_the_cut_lead_to_the_cylinder(seed, oblique_deg):
     first, second = axis_basis(shape.direction)
     turns = np.linspace(0, 2 * np.pi, 30, endpoint=False)
     mantle = shape.point + shape.radius * (np.outer(np.cos(turns), first) + np.outer(np.sin(turns), second))
-    reach = -fit.plane.heights(mantle) / (shape.direction @ fit.plane.normal)
+    reach = -((mantle - fit.plane.point) @ fit.plane.normal) / (shape.direction @ fit.plane.normal)
     points = mantle + reach[:, None] * shape.direction
-    assert np.allclose(fit.plane.heights(points), 0, atol=1e-12)
+    assert np.allclose(((points - fit.plane.point) @ fit.plane.normal), 0, atol=1e-12)
     proposed = propose_cylinders([[EllipseFit(fit_ellipse(fit.plane.project(points)), fit.plane, 30)]])
     assert apart(proposed.directions, shape.direction).min() < 1e-6
     assert np.allclose(proposed.radii, shape.radius, rtol=1e-9)

@@ -46,7 +46,7 @@ def test_a_slice_holds_the_points_within_half_its_thickness(frame, thickness):
     assert section.plane is plane
     assert 0 < len(section.points) == len(expected)
     # projected along the normal: lifted again, each is its point without its height
-    lifted = plane.lift(section.points) + plane.heights(expected)[:, None] * plane.normal
+    lifted = plane.lift(section.points) + ((expected - plane.point) @ plane.normal)[:, None] * plane.normal
     assert np.allclose(lifted, expected, rtol=0, atol=1e-9)
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cylx.api.warmup import compile_kernels
 from cylx.config import Config, Given, check_tolerance, load_config, named_options
+from cylx.evaluation import Evaluation
+from cylx.evaluation import evaluate as evaluate_documents
 from cylx.io import read_cloud, read_json
 from cylx.pipeline import extract_cylinders
 from cylx.records import Crop, Extraction, Observer, PointCloud, Selection, SilentObserver
@@ -147,7 +149,8 @@ def extract(
         cloud = points_or_path
     else:
         cloud = PointCloud.from_array(points_or_path)
-    compile_kernels(observer or SilentObserver())
+    observer = observer or SilentObserver()
+    compile_kernels(observer)
     return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
 
 
@@ -165,6 +168,50 @@ def read_result(path: str | PathLike[str]) -> Result:
         If the file cannot be read, or is no result of this version of the format.
     """
     return Result.parse(read_json(Path(path)), str(path))
+
+
+def evaluate(
+    truth: Mapping[str, object] | Extraction | Result | str | PathLike[str],
+    result: Mapping[str, object] | Extraction | Result | str | PathLike[str],
+    *,
+    angle_deg: float = 5.0,
+    offset: float = 0.25,
+    radius: float = 0.15,
+) -> Evaluation:
+    """Match a result with a truth, one to one, and say how good it is; the same as `cylx evaluate`.
+
+    A pair is admissible if its errors (see `cylx.evaluation.Match`) are all below the given limits. Among the
+    admissible pairs as many as possible are matched, at the least sum of errors over limits. True cylinders marked
+    `ignore` need not be found.
+
+    Parameters
+    ----------
+    truth, result : mapping, Extraction, Result, str or Path
+        JSON objects with a list `cylinders`, the files that hold them, or what was extracted.
+    angle_deg : float
+        Limit of the axis angle, degrees.
+    offset : float
+        Limit of the distance from the axis, in true radii.
+    radius : float
+        Limit of the relative radius error.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, either is malformed, or a true cylinder is not finite.
+    UsageError
+        If a limit is not positive.
+    """
+    documents = _document(truth), _document(result)
+    return evaluate_documents(*documents, angle_deg=angle_deg, offset=offset, radius=radius)
+
+
+def _document(given: Mapping[str, object] | Extraction | Result | str | PathLike[str]) -> Mapping[str, object]:
+    """Return the JSON object that was given, in whatever form."""
+    if isinstance(given, str | PathLike):
+        return read_json(Path(given))
+    found = Result.of(given) if isinstance(given, Extraction) else given
+    return found.to_object() if isinstance(found, Result) else found
 
 
 def to_dict(extraction: Extraction) -> dict[str, Any]:

@@ -11,7 +11,6 @@ import click
 
 from cylx.cli.batch.summary import legible
 from cylx.cli.options.configuration import (
-    PRESETS,
     complete_files,
     configured,
     debug_option,
@@ -20,6 +19,7 @@ from cylx.cli.options.configuration import (
 )
 from cylx.cli.terminal.failures import answer
 from cylx.cli.terminal.group import ExampleGroup
+from cylx.config.choices import PRESETS
 from cylx.errors import ConfigError, UsageError
 
 if TYPE_CHECKING:

@@ -194,12 +194,12 @@ def _only(figures: list[Figure], curves: str | None) -> list[Figure]:
     """Leave the cells of some methods, and the figures that have them."""
     if curves is None:
         return figures
-    from cylx.experiments.figures import METHODS
+    from cylx.experiments.figures import CURVES
 
     names = [name.strip() for name in curves.split(",")]
     for name in names:
-        if name not in METHODS:
-            raise UsageError(f"--curves {curves}", f"'{name}' is no method", f"the methods are {', '.join(METHODS)}")
+        if name not in CURVES:
+            raise UsageError(f"--curves {curves}", f"'{name}' is no method", f"the methods are {', '.join(CURVES)}")
     cut = [figure._replace(cells=tuple(cell for cell in figure.cells if cell.method in names)) for figure in figures]
     left = [figure for figure in cut if figure.cells]
     if not left:

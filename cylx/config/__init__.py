@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from cylx.config.config import Config as Config
     from cylx.config.config import check_tolerance as check_tolerance
     from cylx.config.config import load_config as load_config
-    from cylx.config.config import preset_names as preset_names
     from cylx.config.faults import describe_fault as describe_fault
+    from cylx.config.layers import NAMED_OPTIONS as NAMED_OPTIONS
     from cylx.config.layers import named_options as named_options
     from cylx.config.sections import AveragingConfig as AveragingConfig
     from cylx.config.sections import CandidatesConfig as CandidatesConfig
@@ -42,6 +42,7 @@ _HOMES = {
     "JinConfig": "cylx.config.baselines",
     "LineFitConfig": "cylx.config.baselines",
     "MsacConfig": "cylx.config.baselines",
+    "NAMED_OPTIONS": "cylx.config.layers",
     "SceneConfig": "cylx.config.sections",
     "Section": "cylx.config.sections",
     "SlicingConfig": "cylx.config.sections",
@@ -52,7 +53,6 @@ _HOMES = {
     "load_config": "cylx.config.config",
     "named_options": "cylx.config.layers",
     "plain_yaml": "cylx.config.yaml_writer",
-    "preset_names": "cylx.config.config",
 }
 
 __all__ = sorted(_HOMES)  # noqa: PLE0605  (the names are those above)

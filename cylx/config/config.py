@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any
 
 from pydantic import Field, ValidationError, model_validator
 
 from cylx.config.baselines import JinConfig, LineFitConfig, MsacConfig, TranConfig
+from cylx.config.choices import Method, Preset
 from cylx.config.faults import describe_faults
 from cylx.config.layers import Layer, file_layer, merge, nested, override_layer, preset_layer
 from cylx.config.sections import (
@@ -31,9 +32,9 @@ from cylx.errors import ConfigError
 class Config(Section):
     """All settings of a run."""
 
-    preset: Literal["auto", "paper"] = "auto"
+    preset: Preset = "auto"
     """Where the values start from: `auto`, the best we can do, or `paper`, the paper to the letter."""
-    method: Literal["gt", "msac", "line-fit", "tran", "jin"] = "gt"
+    method: Method = "gt"
     """How cylinders are found: `gt`, the clustering game; the others are what the paper compares it with."""
     seed: Annotated[int, Field(ge=0)] = 0
     """Seed of everything random; the same seed gives the same bytes, on any number of threads."""
@@ -155,11 +156,6 @@ def check_tolerance(config: Config, options: Mapping[str, object]) -> None:
     if config.scene.axis is None and "scene.axis_tolerance_deg" in options:
         fault = "is given without the axis that it is to hold for"
         raise ConfigError("axis tolerance", fault, "give --axis X,Y,Z, or scene.axis, too")
-
-
-def preset_names() -> tuple[str, ...]:
-    """Names of the presets there are."""
-    return get_args(Config.model_fields["preset"].annotation)
 
 
 def _without_empty_sections(layer: Layer) -> Layer:

@@ -139,6 +139,10 @@ def named_options(
     return {key: value for key, value in values.items() if value is not None}
 
 
+NAMED_OPTIONS = tuple(named_options.__kwdefaults__ or ())
+"""Their names; the command line passes on what was given by these."""
+
+
 def _axis(axis: Sequence[float] | str) -> object:
     """Give a direction as the file would have it; what is none is left for the validation to name."""
     if isinstance(axis, str):

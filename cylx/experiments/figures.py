@@ -12,9 +12,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from cylx.config.choices import METHODS
+
 POINTS, HEIGHT = 10_000, 4.0
-COMPETITORS = ("msac", "line-fit", "tran", "jin")
-METHODS = ("gt", *COMPETITORS, "auto")
+COMPETITORS = tuple(method for method in METHODS if method != "gt")
+CURVES = (*METHODS, "auto")
+"""The paper's method and its competitors as the paper has them, and the default of cylx."""
 UNSURE = "auto, 0.02"
 """The default that accepts from a confidence of 0.02: the other methods take what they have, however unlikely."""
 
@@ -98,7 +101,7 @@ def _of_methods(
     panel: str, x: float, scene: tuple[tuple[str, float], ...], planes: int, settings: tuple[str, ...] = _UNIT
 ) -> Iterator[Cell]:
     """Give the cells of all methods at one place."""
-    for method in METHODS:
+    for method in CURVES:
         own = () if method == "auto" else (*_slices(planes, scene), *settings)
         yield Cell(panel, method, x, method, scene, own)
 
@@ -156,7 +159,7 @@ def _figure_10() -> Iterator[Cell]:
 def _of_scan_methods(panel: str, x: float, scene: dict[str, float], planes: int, iterations: int) -> Iterator[Cell]:
     """Give the cells of all methods that find several cylinders; distances are put in with the scan's size."""
     normals = ("msac.neighbours=80", "tran.neighbours=80", f"msac.iterations={iterations}")
-    for method in METHODS:
+    for method in CURVES:
         if method != "line-fit":
             own = () if method == "auto" else (f"slicing.planes={planes}", *_ANY_CLUSTER, *normals)
             yield Cell(panel, method, x, method, tuple(scene.items()), own)

@@ -25,10 +25,6 @@ class Plane:
     point: FloatArray
     normal: FloatArray
 
-    def heights(self, points: FloatArray) -> FloatArray:
-        """Give signed distances of points (N, 3) from the plane, shape (N,)."""
-        return np.asarray((points - self.point) @ self.normal)
-
     def project(self, points: FloatArray) -> FloatArray:
         """Give coordinates of points (N, 3) in the plane, along the normal, shape (N, 2)."""
         first, second = axis_basis(self.normal)

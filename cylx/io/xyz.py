@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.formats import TEXT_SUFFIXES
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.rows import (
     COMMENTS,
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 
     from cylx.io.inputs import Input
 
-SUFFIXES = TEXT_SUFFIXES
 _BLOCK = 1 << 16
 _MOST_COLUMNS = 1000
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, JsonValue, ValidationError
 
 from cylx.config import describe_fault
+from cylx.config.choices import Method
 from cylx.errors import InputError
 from cylx.results.parts import Count, Input, Length, Matrix, Number, Part, Vector, drop_missing, plain_numbers, text_of
 from cylx.results.table import dataframe_of
@@ -190,7 +191,7 @@ class Result(Part):
     """Version of cylx that wrote it."""
     input: Input
     """What was looked at."""
-    method: Literal["gt", "msac", "line-fit", "tran", "jin"] = "gt"
+    method: Method = "gt"
     """How the cylinders were found; `gt` is the clustering game."""
     config: dict[str, JsonValue]
     """The resolved configuration, every value."""

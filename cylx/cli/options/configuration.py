@@ -22,13 +22,11 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from cylx.cli.terminal.failures import DEBUG
+from cylx.config.choices import METHODS, PRESETS
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Bounds = tuple[float | None, float | None]
 Known = tuple[float, float | None]
-
-PRESETS = ("auto", "paper")
-METHODS = ("gt", "msac", "line-fit", "tran", "jin")
 
 
 if TYPE_CHECKING:
@@ -137,36 +135,13 @@ def configured(command: Command) -> Command:
     def with_settings(
         *args: object,
         config: str | None,
-        method: str | None,
         preset: str | None,
         overrides: tuple[str, ...],
-        seed: int | None,
-        radius: Bounds | None,
-        max_cylinders: int | None,
-        planes: int | None,
-        axis: tuple[float, ...] | None,
-        axis_tolerance_deg: float | None,
-        axis_sd_deg: float | None,
-        known_radius: Known | None,
-        catalogue: str | None,
-        min_coverage_deg: float | None,
-        **others: object,
+        **others: Any,  # noqa: ANN401  of several kinds
     ) -> object:
-        from cylx.config import check_tolerance, load_config, named_options
+        from cylx.config import NAMED_OPTIONS, check_tolerance, load_config, named_options
 
-        options = named_options(
-            method=method,
-            seed=seed,
-            radius=radius,
-            max_cylinders=max_cylinders,
-            planes=planes,
-            axis=axis,
-            axis_tolerance_deg=axis_tolerance_deg,
-            axis_sd_deg=axis_sd_deg,
-            known_radius=known_radius,
-            catalogue=catalogue,
-            min_coverage_deg=min_coverage_deg,
-        )
+        options = named_options(**{name: others.pop(name) for name in NAMED_OPTIONS})
         settings = load_config(path=config, preset=preset, overrides=overrides, options=options)
         check_tolerance(settings, options)
         return command(*args, settings=settings, **others)
