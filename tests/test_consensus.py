@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.game.agreement import ALIKE, CONCENTRIC, SAME, WITNESS, Neighbourhood, is_contradicted
+from cylx.game.agreement import AGREEING, CONCENTRIC, LEAST_TELLING_SHARE, LIKE_RADIUS, Neighbourhood, is_contradicted
 from cylx.records import Candidates, Segment
 
 seeds = st.integers(0, 2**32 - 1)
@@ -25,7 +25,7 @@ def a_segment(rng):
 
 def models_about(rng, segment, count):
     """Give candidates that mostly are the cylinder, some hardly and some not at all, all along it and beside."""
-    point, direction, radius = segment.model[:3], segment.model[3:6], segment.model[6]
+    point, direction, radius = segment.point, segment.direction, segment.radius
     sloppy = rng.choice([0.0, 0.05, 0.3, 2.0], (count, 1))
     points = point + 1.6 * segment.half * rng.uniform(-1, 1, (count, 1)) * direction
     points = points + radius * sloppy * rng.standard_normal((count, 3))
@@ -35,24 +35,22 @@ def models_about(rng, segment, count):
 
 
 def candidates_about(rng, segment, count=200):
-    windows = segment.model[6] * np.exp(rng.uniform(-2, 2, count))
+    windows = segment.radius * np.exp(rng.uniform(-2, 2, count))
     return Candidates(models_about(rng, segment, count), np.arange(count), np.zeros(count), np.full(count, 20), windows)
 
 
 def distances(points, segment):
     """Give heights and distances from the axis."""
-    offsets = points - segment.model[:3]
-    heights = offsets @ segment.model[3:6]
-    return heights, np.linalg.norm(offsets - heights[:, None] * segment.model[3:6], axis=1)
+    offsets = points - segment.point
+    heights = offsets @ segment.direction
+    return heights, np.linalg.norm(offsets - heights[:, None] * segment.direction, axis=1)
 
 
 def same(models, segment, offset, cosine, radius):
     """Tell which models agree with a cylinder; offset in its radii."""
     _, apart = distances(models[:, :3], segment)
-    turns = np.abs(models[:, 3:6] @ segment.model[3:6])
-    return (
-        (apart < offset * segment.model[6]) & (turns > cosine) & (np.abs(models[:, 6] / segment.model[6] - 1) < radius)
-    )
+    turns = np.abs(models[:, 3:6] @ segment.direction)
+    return (apart < offset * segment.radius) & (turns > cosine) & (np.abs(models[:, 6] / segment.radius - 1) < radius)
 
 
 @laws
@@ -62,13 +60,15 @@ def test_agreement_is_that_of_all_candidates(seed):
     segment = a_segment(rng)
     candidates = candidates_about(rng, segment)
     heights, apart = distances(candidates.points, segment)
-    telling = candidates.windows > WITNESS * min(segment.model[6], 1.2 * segment.half)
-    near = telling & (np.abs(heights) < segment.half) & (apart < segment.model[6])
+    telling = candidates.windows > LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half)
+    near = telling & (np.abs(heights) < segment.half) & (apart < segment.radius)
     # a pipe on the same axis that is much thinner or thicker is another one
-    ratio = candidates.radii / segment.model[6]
-    near &= (ratio > ALIKE) & (ratio < 1 / ALIKE)  # and of a detail: a rim, a dent
-    near &= ~(same(candidates.models, segment, *SAME[:2], np.inf) & ((ratio <= CONCENTRIC) | (ratio >= 1 / CONCENTRIC)))
-    expected = int((near & same(candidates.models, segment, *SAME)).sum()), int(near.sum())
+    ratio = candidates.radii / segment.radius
+    near &= (ratio > LIKE_RADIUS) & (ratio < 1 / LIKE_RADIUS)  # and of a detail: a rim, a dent
+    near &= ~(
+        same(candidates.models, segment, *AGREEING[:2], np.inf) & ((ratio <= CONCENTRIC) | (ratio >= 1 / CONCENTRIC))
+    )
+    expected = int((near & same(candidates.models, segment, *AGREEING)).sum()), int(near.sum())
     assert Neighbourhood(candidates).agreement(segment) == expected
 
 
@@ -80,7 +80,7 @@ def test_those_who_agree_are_all_who_do_and_are_alive(seed, offset, angle_deg, r
     candidates = candidates_about(rng, segment)
     alive = rng.random(len(candidates)) < 0.7
     heights, apart = distances(candidates.points, segment)
-    near = (np.abs(heights) < segment.half + segment.model[6]) & (apart < segment.model[6])
+    near = (np.abs(heights) < segment.half + segment.radius) & (apart < segment.radius)
     expected = near & alive & same(candidates.models, segment, offset, np.cos(np.radians(angle_deg)), radius)
     found = Neighbourhood(candidates).agreeing(segment, alive, offset, angle_deg, radius)
     assert np.array_equal(np.sort(found), np.flatnonzero(expected))

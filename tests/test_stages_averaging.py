@@ -127,7 +127,7 @@ def assert_true(segment, truth, error):
     angle, offset = axis_apart(segment, Segment(truth, 1.0, 0.0))
     assert angle < error
     assert offset < error * truth[6]
-    assert abs(segment.model[6] / truth[6] - 1) < error
+    assert abs(segment.radius / truth[6] - 1) < error
 
 
 @pytest.mark.parametrize("seed", range(4))

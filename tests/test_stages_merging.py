@@ -66,8 +66,8 @@ def test_two_pieces_of_a_pipe_become_one(gap):
     indexed, findings, frame = world(pipe(0, 4), pipe(4 + gap, 8 + gap))
     (whole,) = merge_pieces(findings, indexed, accept(indexed))
     assert np.isclose(2 * whole.segment.half * frame.spacing, 8 + gap, rtol=0.01)
-    assert np.isclose(whole.segment.model[6] * frame.spacing, 1.0, rtol=0.005)
-    assert np.allclose(np.cross(whole.segment.model[3:6], [0, 0, 1]), 0, atol=0.005)
+    assert np.isclose(whole.segment.radius * frame.spacing, 1.0, rtol=0.005)
+    assert np.allclose(np.cross(whole.segment.direction, [0, 0, 1]), 0, atol=0.005)
     assert len(whole.points) > 2900
 
 

@@ -65,7 +65,7 @@ def test_errors_are_those_of_the_bound():
     indexed, segment = world(pipe())
     verdict = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     # over a full turn: 2 sigma / sqrt(n) of the place, 2 sigma sqrt(3) / (h / 2) / sqrt(n) of the angle
-    noise, n = SIGMA * segment.model[6], len(verdict.points)
+    noise, n = SIGMA * segment.radius, len(verdict.points)
     assert np.isclose(verdict.offset_error, 2 * noise / np.sqrt(n), rtol=0.1)
     assert np.isclose(verdict.tilt_error, 2 * noise * np.sqrt(3) / segment.half / np.sqrt(n), rtol=0.1)
 
@@ -85,7 +85,7 @@ def test_a_cone_shows_its_slope(taper_deg):
     verdict = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     assert np.isclose(verdict.measures["slope"], slope, rtol=0.4)
     assert verdict.reason != ""
-    segment.model[3:6] *= -1.0  # the result has the upward direction all the same
+    segment.direction *= -1.0  # the result has the upward direction all the same
     turned = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     assert np.isclose(turned.measures["slope"], verdict.measures["slope"], rtol=1e-6)
 
@@ -216,7 +216,7 @@ def test_the_shell_is_what_is_about_the_segment():
     indexed, segment = world(np.concatenate([pipe(), pipe() * [3, 3, 1]]))
     shell = look_at(segment, indexed)
     assert (np.abs(shell.heights) <= 1).all()
-    assert (shell.residuals <= 0.5 * segment.model[6] * (1 + 1e-9)).all()
+    assert (shell.residuals <= 0.5 * segment.radius * (1 + 1e-9)).all()
     assert np.array_equal(shell.on, np.abs(shell.residuals) < 3 * shell.deviation)
     assert len(shell.indices) < 3100
     assert not shell.flat.any()

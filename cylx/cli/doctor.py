@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from cylx.cli.batch.memory import free_memory
+from cylx.cli.batch.memory import cores, free_memory
 from cylx.cli.options.configuration import debug_option, json_option
 from cylx.cli.terminal.failures import answer
 from cylx.cli.terminal.group import ExampleCommand
@@ -169,10 +169,7 @@ def check_kernels() -> Check:
 
 def check_machine() -> Check:
     """Check the processor and the memory that is free."""
-    cores = os.cpu_count() or 1
-    with suppress(AttributeError):  # not on every system
-        cores = len(os.sched_getaffinity(0))
-    count = f"{cores} core{'' if cores == 1 else 's'}"
+    count = f"{cores()} core{'' if cores() == 1 else 's'}"
     free = free_memory()
     if free is None:
         return Check("machine", "ok", f"{count}; free memory unknown", needed=False)

@@ -11,7 +11,7 @@ from cylx.cli.batch.jobs import check_apart, check_outputs, plan_jobs
 from cylx.cli.batch.meshes import check_meshes
 from cylx.cli.batch.options import BatchOptions, made_folder
 from cylx.cli.options.batch import with_batch_options
-from cylx.cli.options.configuration import complete_files, configured, debug_option, overwrite_option, talking
+from cylx.cli.options.configuration import complete_files, configured, debug_option, overwrite_option, with_messages
 from cylx.cli.options.selection import selecting
 from cylx.cli.options.units import units_option
 from cylx.cli.terminal.group import ExampleCommand
@@ -84,7 +84,7 @@ if TYPE_CHECKING:
 )
 @with_batch_options
 @overwrite_option
-@talking
+@with_messages
 @debug_option
 def extract(
     *,

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from cylx.cli.options.configuration import complete_files, debug_option, json_option, talking
+from cylx.cli.options.configuration import complete_files, debug_option, json_option, with_messages
 from cylx.cli.terminal.failures import answer
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import OutputError, UsageError
@@ -54,7 +54,7 @@ SAVED_EVERY = 5.0
     shell_complete=complete_files,
     help="Scan of an upright can for figures 11 and 12, such as the tomato soup can of the YCB objects.",
 )
-@talking
+@with_messages
 @json_option
 @debug_option
 def reproduce(

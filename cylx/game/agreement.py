@@ -12,20 +12,20 @@ from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.records import Candidates, Segment
 
-WITNESS = 0.4
+LEAST_TELLING_SHARE = 0.4
 """Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
 smaller."""
 CONCENTRIC = 0.85
 """A candidate on the same axis that is thinner or thicker than this is one of another surface."""
-ALIKE = 0.4
+LIKE_RADIUS = 0.4
 """A candidate so many times thinner or thicker is one of another thing, or of a detail: a rim, a dent, an edge."""
-SAME = 0.15, math.cos(math.radians(6.0)), 0.1
+AGREEING = 0.15, math.cos(math.radians(6.0)), 0.1
 """A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
 
 
 def least_telling(segment: Segment) -> float:
     """Give the radius from which a window can tell a cylinder."""
-    return float(WITNESS * min(segment.radius, 1.2 * segment.half))
+    return float(LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half))
 
 
 class Neighbourhood:
@@ -57,7 +57,7 @@ class Neighbourhood:
         seen = least_telling(segment)
         part = self._beside(segment, segment.half)
         consistent, near = _count_agreeing(
-            self._models[part], self._windows[part], segment.model, segment.half, seen, *SAME
+            self._models[part], self._windows[part], segment.model, segment.half, seen, *AGREEING
         )
         return int(consistent), int(near)
 
@@ -103,7 +103,7 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
         return 0
     turn, ratio = row[UX] * model[UX] + row[UY] * model[UY] + row[UZ] * model[UZ], row[RADIUS] / model[RADIUS]
     if square >= (offset * model[RADIUS]) ** 2 or abs(turn) <= cosine:
-        return 1 if ALIKE < ratio < 1.0 / ALIKE else 0
+        return 1 if LIKE_RADIUS < ratio < 1.0 / LIKE_RADIUS else 0
     if abs(ratio - 1.0) < radius:
         return 2
     return 1 if CONCENTRIC < ratio < 1.0 / CONCENTRIC else 0  # a pipe within a pipe speaks for itself

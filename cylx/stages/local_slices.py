@@ -42,7 +42,7 @@ def slice_windows(
     explained: Explained,
     radius_range: tuple[float, float],
     config: SlicingConfig,
-    octave_ratio: float,
+    scale_ratio: float,
     supported: tuple[int, float],
     seed: int,
     threads: int,
@@ -57,7 +57,7 @@ def slice_windows(
     radius_range : tuple of float
         Least and greatest radius, frame units.
     config : SlicingConfig
-    octave_ratio : float
+    scale_ratio : float
         Ratio of successive window radii.
     supported : (int, float)
         Fewest points of a candidate, and their least share of its window.
@@ -73,7 +73,7 @@ def slice_windows(
     """
     parts: list[Candidates] = []
     totals = np.zeros(len(COUNTS), np.int64)
-    for radius in reversed(frame.window_radii(octave_ratio)):
+    for radius in reversed(frame.window_radii(scale_ratio)):
         scale = Scale.of(frame, radius, explained.flatness == 0)
         if len(scale.points) < LEAST_POINTS_OF_SLICE:
             continue

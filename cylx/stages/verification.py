@@ -117,11 +117,13 @@ def verify(
     }
     probability, worst = weigh({**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff})
     confidence = round(probability, 3)  # further digits would order equals by chance
-    reason = _refusal(measures, len(points), coverage, config) or ("" if confidence >= config.min_confidence else worst)
+    reason = broken_limit(measures, len(points), coverage, config) or (
+        "" if confidence >= config.min_confidence else worst
+    )
     return Verdict(reason, confidence, measures, coverage, points, shape["offset_error"], shape["tilt_error"])
 
 
-def _refusal(measures: dict[str, float], count: int, coverage: float, config: VerificationConfig) -> str:
+def broken_limit(measures: dict[str, float], count: int, coverage: float, config: VerificationConfig) -> str:
     """Give the name of a limit the user has set that is not kept, or nothing."""
     limits = {
         "too few points": count < config.min_inliers,

@@ -3,7 +3,7 @@
 | function | options | the command gets |
 |---|---|---|
 | `configured` | `-c/--config --method --preset --set --seed`, and limits: `--radius` … | `settings`, a `Config` |
-| `talking` | `-q/--quiet -v/--verbose` | `messages`, a `Messages` |
+| `with_messages` | `-q/--quiet -v/--verbose` | `messages`, a `Messages` |
 | `overwrite_option` | `--overwrite` | `overwrite`, a bool |
 | `json_option` | `--json` | `as_json`, a bool |
 | `debug_option` | `--debug` | nothing |
@@ -216,7 +216,7 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
 )
 
 
-def talking(command: Command) -> Command:
+def with_messages(command: Command) -> Command:
     """Add `-q` and `-v`; the command gets `messages`."""
 
     @functools.wraps(command)
