@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, coordinates_of
 from cylx.records import IndexedCloud, Segment
 
@@ -43,7 +42,7 @@ class Shell:
         Standard deviation the surface was cut out with.
     """
 
-    indices: NDArray[np.int64]
+    indices: IndexArray
     heights: FloatArray
     residuals: FloatArray
     angles: FloatArray

@@ -6,12 +6,11 @@ import hashlib
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.optional.open3d import estimate_normals
 
-FaceArray = NDArray[np.int64]
+FaceArray = IndexArray
 
 SCANNED = 373_205
 """Points of the paper's scan of the soup can; a mesh is sampled with as many."""

@@ -10,10 +10,10 @@ from math import ceil, floor, log10
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.export.drawing import Drawing, Exported
 from cylx.export.formats import METRES
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import Cylinder, axis_basis
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     return Exported(b"\n".join([first, second, f"comment {said}".encode(), rest]), offset)
 
 
-def mesh_of(cylinder: Cylinder) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def mesh_of(cylinder: Cylinder) -> tuple[FloatArray, IndexArray]:
     """Give the corners and triangles of a closed prism about the middle of a cylinder, seen from outside.
 
     Returns

@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.records import Candidates, Segment
 
@@ -62,7 +61,7 @@ class Neighbourhood:
         return int(consistent), int(near)
 
     def agreeing(
-        self, segment: Segment, alive: NDArray[np.bool_], offset: float, angle_deg: float, radius: float
+        self, segment: Segment, alive: MaskArray, offset: float, angle_deg: float, radius: float
     ) -> IndexArray:
         """Give those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
         reach = segment.half + segment.radius
@@ -133,7 +132,7 @@ def _count_agreeing(
 def _pick_agreeing(
     models: FloatArray,
     order: IndexArray,
-    alive: NDArray[np.bool_],
+    alive: MaskArray,
     model: FloatArray,
     reach: float,
     offset: float,

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 
 SECTORS = 36
 
@@ -31,6 +30,6 @@ def filled_sectors(angles: FloatArray, sectors: int, share: float = 0.15) -> Mas
     return np.asarray(counts > max(0.5, share * float(np.median(counts[counts > 0]))), dtype=np.bool_)
 
 
-def sector_of(angles: FloatArray) -> NDArray[np.int64]:
+def sector_of(angles: FloatArray) -> IndexArray:
     """Give the sector, of `SECTORS`, that each angle (radians) lies in."""
     return np.floor((angles / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS

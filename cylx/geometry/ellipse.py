@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.numerics import REORDERED, solve_in_place
 
 
@@ -166,7 +165,7 @@ def search_ellipse(
     semi_minor: tuple[float, float],
     max_aspect: float,
     refits: int = 3,
-) -> tuple[Ellipse, NDArray[np.bool_]] | Degenerate:
+) -> tuple[Ellipse, MaskArray] | Degenerate:
     """Find the ellipse that most points support: RANSAC over samples of five, then direct fits to the support.
 
     Parameters

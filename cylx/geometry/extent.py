@@ -6,9 +6,8 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.numerics import median_of_positive, sort_in_place
 
 ARC_BINS = 24
@@ -111,7 +110,7 @@ def _bin(angle: float) -> int:
 def _fill_shares(
     heights: FloatArray,
     angles: FloatArray,
-    arc: NDArray[np.bool_],
+    arc: MaskArray,
     width: int,
     piece: float,
     first: float,
@@ -167,7 +166,7 @@ def _choose_run(
 def _set_ends(
     heights: FloatArray,
     angles: FloatArray,
-    arc: NDArray[np.bool_],
+    arc: MaskArray,
     low: float,
     high: float,
     margin: float,

@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.numerics import cross, symmetric_eigen
 
 LEAST_POINTS_OF_LINE = 8
@@ -72,7 +72,7 @@ def common_perpendicular(
     )
 
 
-def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> NDArray[np.bool_]:
+def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> MaskArray:
     """Tell which directions are parallel to an axis within an angle; signs do not matter.
 
     Parameters

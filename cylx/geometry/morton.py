@@ -10,9 +10,8 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 
 BITS = 21
 """Bits an axis: 3 x 21 fit a signed 64-bit integer."""
@@ -163,7 +162,7 @@ def cell_starts(codes: IndexArray, level: int) -> tuple[IndexArray, IndexArray]:
     return keys[first], np.concatenate((first, [len(codes)])).astype(np.int64)
 
 
-def group(codes: IndexArray, level: int, keep: NDArray[np.bool_]) -> tuple[IndexArray, IndexArray, IndexArray]:
+def group(codes: IndexArray, level: int, keep: MaskArray) -> tuple[IndexArray, IndexArray, IndexArray]:
     """Give the points to keep, the occupied cells of one level, and where each one's run of these points begins.
 
     Parameters
@@ -191,7 +190,7 @@ def group(codes: IndexArray, level: int, keep: NDArray[np.bool_]) -> tuple[Index
 def _group(
     codes: IndexArray,
     shift: int,
-    keep: NDArray[np.bool_],
+    keep: MaskArray,
     members: IndexArray,
     cells: IndexArray,
     starts: IndexArray,
@@ -209,7 +208,7 @@ def _group(
     return count
 
 
-def thin(codes: IndexArray, level: int, keep: NDArray[np.bool_] | None = None) -> IndexArray:
+def thin(codes: IndexArray, level: int, keep: MaskArray | None = None) -> IndexArray:
     """Pick one point of each occupied cell, pseudo-randomly by the cell's code.
 
     Parameters

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.fits.likelihood import CONTRADICTION
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.coverage import covered_angle
 from cylx.records import (
     CylinderFit,
@@ -83,7 +83,7 @@ def assemble(
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, shown)
 
 
-def _covariance(finding: Finding, spacing: float) -> NDArray[np.float64] | None:
+def _covariance(finding: Finding, spacing: float) -> FloatArray | None:
     """Put the covariance of a finding into scene units, inflated as its residuals ask for."""
     covariance = finding.segment.covariance
     if covariance is None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import plain_yaml
+from cylx.geometry.arrays import FloatArray
 from cylx.palette import cylinder_colors
 from cylx.report.maps import MOST_CELLS, unroll
 from cylx.report.points import choose_points, pack_labels, pack_residuals, quantise
@@ -108,7 +109,7 @@ def _unit(view: View) -> float:
     return view.noise or scatter or 1.0
 
 
-def _home(points: NDArray[np.float64], shapes: NDArray[np.float64]) -> dict[str, Any]:
+def _home(points: FloatArray, shapes: FloatArray) -> dict[str, Any]:
     """Give the ball that is looked at first: of all but the most outlying points, and of all cylinders."""
     low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
     for ends in (shapes[:, :3], shapes[:, 3:6]):

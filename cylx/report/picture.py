@@ -7,8 +7,8 @@ import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.optional.matplotlib import new_figure
 from cylx.palette import cylinder_colors
@@ -101,7 +101,7 @@ def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None 
     return canvas
 
 
-def outline(cylinder: Cylinder) -> list[NDArray[np.float64]]:
+def outline(cylinder: Cylinder) -> list[FloatArray]:
     """Give the lines a cylinder is drawn by: its two rims, and straight lines between them.
 
     Parameters
@@ -119,7 +119,7 @@ def outline(cylinder: Cylinder) -> list[NDArray[np.float64]]:
     return [*rims, *(np.array([rims[0][i], rims[1][i]]) for i in range(0, _AROUND, _AROUND // _RULINGS))]
 
 
-def _frame(axes: Any, points: NDArray[np.float64]) -> None:  # noqa: ANN401  (it has no types)
+def _frame(axes: Any, points: FloatArray) -> None:  # noqa: ANN401  (it has no types)
     """Show all points, at the same scale along all axes."""
     low, high = points.min(axis=0), points.max(axis=0)
     size = np.maximum(high - low, 0.05 * float((high - low).max()) or 1.0)

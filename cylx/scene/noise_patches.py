@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, MaskArray
 
 MAD_SHRINKAGE = 0.93
 """What the median absolute deviation of 48 quadric residuals shows of a Gaussian's standard deviation, as a share."""
@@ -88,7 +87,7 @@ def _residuals(design: FloatArray, height: FloatArray, weights: FloatArray) -> F
     return np.asarray(height - (design @ terms)[..., 0], dtype=np.float64)
 
 
-def _masked_median(values: FloatArray, mask: NDArray[np.bool_]) -> FloatArray:
+def _masked_median(values: FloatArray, mask: MaskArray) -> FloatArray:
     """Give the median of the masked values of each row, shape (m, 1); each row has some."""
     ordered = np.sort(np.where(mask, values, np.inf), axis=1)
     count = np.maximum(mask.sum(axis=1, keepdims=True), 1)

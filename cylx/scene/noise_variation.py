@@ -7,9 +7,8 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.morton import BITS, cell_starts, gather_ball
 from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
 
@@ -133,7 +132,7 @@ def _fill_patches(
     sample: IndexArray,
     size: float,
     patches: FloatArray,
-    full: NDArray[np.bool_],
+    full: MaskArray,
 ) -> None:
     """Fill each patch with points evenly picked from the ball about a sample point, if it holds enough of them."""
     found = np.empty(40000, np.int64)

@@ -6,11 +6,10 @@ import math
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
@@ -123,7 +122,7 @@ def _polish(
     min_inliers: int,
     min_share: float,
     rows: FloatArray,
-    kept: NDArray[np.bool_],
+    kept: MaskArray,
 ) -> None:
     found, around = np.empty(MOST_POINTS_TO_POLISH, np.int64), np.empty((3, MOST_POINTS_TO_POLISH))
     quality, center = np.empty(3), np.empty(3)

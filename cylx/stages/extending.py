@@ -11,10 +11,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
 
@@ -107,7 +106,7 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
     return Segment(longer, 0.5 * (high - low), spread)
 
 
-def _end(heights: FloatArray, on: NDArray[np.bool_], half: float, reach: float, share: float) -> float:
+def _end(heights: FloatArray, on: MaskArray, half: float, reach: float, share: float) -> float:
     """Give the height at which the points on the surface end, `half` if there are too few beyond it.
 
     Along the axis each point on the surface counts one, each beside it takes off what is to be expected on the surface,

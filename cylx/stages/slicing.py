@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.config import SlicingConfig
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import canonical_direction
 from cylx.geometry.plane import Plane, random_directions
 from cylx.records import Frame, Slice, stream
@@ -68,7 +67,7 @@ def cut_slice(points: FloatArray, plane: Plane, thickness: float) -> Slice:
 
 
 @njit(cache=True, nogil=True)
-def _find_close(points: FloatArray, normal: FloatArray, offset: float, width: float, close: NDArray[np.int64]) -> int:
+def _find_close(points: FloatArray, normal: FloatArray, offset: float, width: float, close: IndexArray) -> int:
     """Fill in the indices of the points near a plane; count them."""
     n = 0
     for i in range(len(points)):

@@ -10,12 +10,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cylx.config import VerificationConfig
 from cylx.evidence.measures import TRUNCATED, distinct_places, lack_of_fit, look_at, shape_of
 from cylx.evidence.surroundings import continuation, emptiness, flank
 from cylx.evidence.weights import weigh
+from cylx.geometry.arrays import IndexArray
 from cylx.geometry.coverage import covered_angle
 from cylx.records import IndexedCloud, Segment
 
@@ -49,7 +49,7 @@ class Verdict:
     confidence: float
     measures: dict[str, float]
     coverage: float
-    points: NDArray[np.int64]
+    points: IndexArray
     offset_error: float = math.inf
     tilt_error: float = math.inf
 

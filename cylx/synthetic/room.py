@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import Cylinder
 from cylx.synthetic.placement import Room
 from cylx.synthetic.scene import NOISE, OTHER_SURFACE, SyntheticScene, demand, true_cylinder
@@ -152,7 +151,7 @@ def _place_clutter(rng: np.random.Generator, space: Room, counts: Mapping[str, i
 
 def _draw(
     rng: np.random.Generator, surfaces: Sequence[Surface], total: int, sigma: float
-) -> tuple[FloatArray, NDArray[np.int64], list[FloatArray]]:
+) -> tuple[FloatArray, IndexArray, list[FloatArray]]:
     """Draw points at even density; return the noisy ones, the index of their surface, and the exact ones by surface."""
     demand(surfaces or total == 0, "noise", "must be 1 where there is no surface at all")
     areas = np.array([surface.area for surface in surfaces])
