@@ -85,7 +85,7 @@ def test_a_cone_shows_its_slope(taper_deg):
     verdict = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     assert np.isclose(verdict.measures["slope"], slope, rtol=0.4)
     assert verdict.reason != ""
-    segment.direction *= -1.0  # the result has the upward direction all the same
+    segment.model[3:6] *= -1.0  # the result has the upward direction all the same
     turned = verify(segment, indexed, 0.8, (40, 42), VerificationConfig())
     assert np.isclose(turned.measures["slope"], verdict.measures["slope"], rtol=1e-6)
 
