@@ -374,7 +374,7 @@ def test_points_of_a_mesh_are_even_over_its_faces_within_the_noise(monkeypatch):
     assert scan.points.shape == (20_000, 3)
     away = np.abs(np.stack([scan.points, scan.points - sides]))  # distance from each of the six faces
     nearest = away.transpose(1, 0, 2).reshape(-1, 6)
-    noise = scans.THICKNESS * extent
+    noise = scans.NOISE_OF_SCAN * extent
     assert nearest.min(axis=1).max() < 5.5 * noise
     # off the edges only one coordinate has a part in the distance: that is Gaussian, and folded
     inside = np.sort(nearest, axis=1)[:, 1] > 6 * noise
