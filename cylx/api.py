@@ -166,7 +166,7 @@ def read_result(path: str | PathLike[str]) -> Result:
 
 
 def to_dict(extraction: Extraction) -> dict[str, Any]:
-    """Give an extraction as the JSON object that `cylx extract` writes.
+    """Return an extraction as the JSON object that `cylx extract` writes.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def to_dict(extraction: Extraction) -> dict[str, Any]:
 
 
 def to_dataframe(found: Extraction | Result) -> Any:  # noqa: ANN401  pandas is an extra
-    """Give the cylinders as a pandas data frame, one row each.
+    """Return the cylinders as a pandas data frame, one row each.
 
     Vectors have a column for each of x, y and z, and keys of inner objects follow that of the object:
     `uncertainty_radius` is the standard deviation of the radius.

@@ -14,7 +14,7 @@ _GOLDEN = 0.6180339887498949
 
 
 def cylinder_colors(ids: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
-    """Give each cylinder a colour of its own, which depends on its id alone; grey for -1.
+    """Return each cylinder a colour of its own, which depends on its id alone; grey for -1.
 
     Parameters
     ----------

@@ -146,7 +146,7 @@ def _search_sphere(
 
 @njit(cache=True, nogil=True)
 def _det(m: FloatArray, a: int, b: int, c: int) -> float:
-    """Give the determinant of three columns of a matrix of three rows."""
+    """Return the determinant of three columns of a matrix of three rows."""
     return float(
         m[0, a] * (m[1, b] * m[2, c] - m[1, c] * m[2, b])
         - m[0, b] * (m[1, a] * m[2, c] - m[1, c] * m[2, a])
@@ -155,7 +155,7 @@ def _det(m: FloatArray, a: int, b: int, c: int) -> float:
 
 
 def _straight(spheres: FloatArray, linearity: float) -> MaskArray:
-    """Tell which spheres lie where the pipe is straight: their neighbours' centres spread along a line."""
+    """Return which spheres lie where the pipe is straight: their neighbours' centres spread along a line."""
     straight = np.zeros(len(spheres), np.bool_)
     for k, sphere in enumerate(spheres):
         near = spheres[((spheres[:, :3] - sphere[:3]) ** 2).sum(axis=1) < (NEAR * sphere[3]) ** 2, :3]
@@ -167,7 +167,7 @@ def _straight(spheres: FloatArray, linearity: float) -> MaskArray:
 
 
 def _best_line(spheres: FloatArray, pairs: IndexArray, distance: float, limits: Limits) -> MaskArray:
-    """Give the spheres that the best supported line through two centres goes through."""
+    """Return the spheres that the best supported line through two centres goes through."""
     best = np.zeros(len(spheres), np.bool_)
     for i, j in pairs:
         line = spheres[j, :3] - spheres[i, :3]

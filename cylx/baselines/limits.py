@@ -37,5 +37,5 @@ class Limits:
         return np.array([*self.radii, *self.axis, math.cos(self.tilt)])
 
     def admit(self, direction: FloatArray) -> bool:
-        """Say whether cylinders may have this unit direction, either way."""
+        """Return whether cylinders may have this unit direction, either way."""
         return self.axis is None or abs(float(direction @ self.axis)) >= math.cos(self.tilt)

@@ -97,7 +97,7 @@ def find_by_consensus(
 def _best_of(
     points: FloatArray, normals: FloatArray, pairs: IndexArray, distance: float, limits: FloatArray, threads: int
 ) -> FloatArray | None:
-    """Give the cylinder of least loss among those of all pairs of points."""
+    """Return the cylinder of least loss among those of all pairs of points."""
 
     def work(start: int) -> tuple[float, int, FloatArray]:
         model = np.empty(7)

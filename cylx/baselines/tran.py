@@ -130,7 +130,7 @@ class _Garden:
         self._tree = cKDTree(frame.points)
 
     def curved_starts(self, drawn: IndexArray) -> list[IndexArray]:
-        """Give the neighbourhoods of those points about which the normals spread along one direction."""
+        """Return the neighbourhoods of those points about which the normals spread along one direction."""
         wanted = min(self._config.start_neighbours, len(self._points))
         starts = []
         for near in self._tree.query(self._points[drawn], k=wanted)[1].reshape(len(drawn), -1):
@@ -164,7 +164,7 @@ class _Garden:
         return Grown(model, self._points[inliers[[int(heights.argmin()), int(heights.argmax())]]])
 
     def _fit(self, inliers: IndexArray, place: FloatArray) -> FloatArray | None:
-        """Give the cylinder whose axis is across all normals, and whose circle fits the points seen along it."""
+        """Return the cylinder whose axis is across all normals, and whose circle fits the points seen along it."""
         normals = self._normals[inliers]
         direction = canonical_direction(np.linalg.eigh(normals.T @ normals)[1][:, 0])
         across = np.column_stack(axis_frame(direction))
@@ -174,7 +174,7 @@ class _Garden:
         return np.concatenate([place + across @ circle[0], direction, [circle[1]]])
 
     def _gather(self, model: FloatArray, place: FloatArray, reach: float) -> tuple[IndexArray, float]:
-        """Give the points near the surface and the seed whose normals agree, and their share of all that are near."""
+        """Return the points near the surface and the seed whose normals agree, and their share of all that are near."""
         radius = float(model[6])
         inner, outer = max(0.0, radius - self._distance), radius + self._distance
         near = self._cells.near_cylinder(model, -reach, reach, inner, outer)
@@ -233,7 +233,7 @@ def _shifted(model: FloatArray, models: FloatArray, angle: float, length: float)
 
 
 def _squared_distances(model: FloatArray, models: FloatArray, angle: float, length: float) -> FloatArray:
-    """Give squared distances of cylinders (n, 7) from one, in bandwidths, shape (n,)."""
+    """Return squared distances of cylinders (n, 7) from one, in bandwidths, shape (n,)."""
     cosines = np.clip(np.abs(models[:, 3:6] @ model[3:6]), 0.0, 1.0)
     offsets = np.linalg.norm(_feet(model[:3], models) - model[:3], axis=1)
     scale = length * model[6]
@@ -243,6 +243,6 @@ def _squared_distances(model: FloatArray, models: FloatArray, angle: float, leng
 
 
 def _feet(point: FloatArray, models: FloatArray) -> FloatArray:
-    """Give the points nearest to one on the axes of cylinders (n, 7), shape (n, 3)."""
+    """Return the points nearest to one on the axes of cylinders (n, 7), shape (n, 3)."""
     along = ((point - models[:, :3]) * models[:, 3:6]).sum(axis=1)
     return np.asarray(models[:, :3] + along[:, None] * models[:, 3:6])

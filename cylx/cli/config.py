@@ -68,7 +68,7 @@ def show(*, settings: Config, as_json: bool) -> None:
 @json_option
 @debug_option
 def check(*, file: str, as_json: bool) -> None:
-    """Say whether the configuration FILE is valid, and what is wrong with it if not.
+    """Return whether the configuration FILE is valid, and what is wrong with it if not.
 
     The first fault is told on standard error; the JSON has all that can be seen at once.
     """
@@ -90,7 +90,7 @@ def _verdict(file: str, preset: str | None, faults: Sequence[Mapping[str, object
 
 
 def _faults_of(failure: ConfigError, file: str) -> list[dict[str, object]]:
-    """Give all faults with the dotted path or the line, whichever is known."""
+    """Return all faults with the dotted path or the line, whichever is known."""
     place = failure.place.removeprefix(file)
     line, key = re.fullmatch(r":(\d+)", place), re.fullmatch(r"(?:: )?(\w+(?:\.\w+)*)", place)
     known = failure.faults or ((key[1] if key else "", failure.fault, failure.remedy),)

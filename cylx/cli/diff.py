@@ -36,7 +36,7 @@ _TOLERANCE = click.FloatRange(min=0)
 @json_option
 @debug_option
 def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
-    """Say whether the results A and B are the same cylinders within tolerances.
+    """Return whether the results A and B are the same cylinders within tolerances.
 
     The order of the cylinders does not matter. The exit code is 0 if they are the same and 1 if not; what differs is
     shown.

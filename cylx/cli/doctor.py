@@ -231,7 +231,7 @@ def extras_there_are() -> set[str]:
 
 
 def free_memory() -> int | None:
-    """Give the memory that is free, bytes; None where the system does not say."""
+    """Return the memory that is free, bytes; None where the system does not say."""
     with suppress(OSError):
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):
@@ -258,17 +258,17 @@ def _imported(
 
 
 def _version(package: str) -> str | None:
-    """Give the version of an installed package."""
+    """Return the version of an installed package."""
     with suppress(PackageNotFoundError):
         return version(package)
     return None
 
 
 def _first_line(error: BaseException) -> str:
-    """Give what an error says, on one line."""
+    """Return what an error says, on one line."""
     return next(iter(_lines(error)), type(error).__name__)
 
 
 def _lines(error: BaseException) -> Iterator[str]:
-    """Give the lines of an error that say something."""
+    """Return the lines of an error that say something."""
     return filter(None, map(str.strip, str(error).splitlines()))

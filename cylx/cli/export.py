@@ -69,7 +69,7 @@ def export(
 
 
 def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[str, Any]:
-    """Say what was written, for programs."""
+    """Return what was written, for programs."""
     return {
         "result": legible(result),
         "cylinders": len(drawing.cylinders),
@@ -100,7 +100,7 @@ def _sure(path: str, cylinders: Sequence[ResultCylinder], least: float) -> list[
 
 
 def _report(path: str, drawing: Drawing, written: dict[str, Exported]) -> None:
-    """Say what was written where, and what its reader has to know."""
+    """Return what was written where, and what its reader has to know."""
     count = len(drawing.cylinders)
     tell(f"{path}: {count} cylinder{'' if count == 1 else 's'}, written to {', '.join(written)}")
     for remark in remarks_on(drawing, written):

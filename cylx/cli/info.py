@@ -105,7 +105,7 @@ def _scarce_memory(needed: int) -> list[Caution]:
 
 
 def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
-    """Give what a file says of itself as a JSON object; bounds and extent are those of the points that take part."""
+    """Return what a file says of itself as a JSON object; bounds and extent are those of the points that take part."""
     table = whole.table
     names = ("x", "y", "z") if table is None or table.dtype.names is None else table.dtype.names
     fields = [{"name": n, "type": "float64" if table is None else str(table.dtype[n])} for n in names]

@@ -78,7 +78,7 @@ def beside(result: str) -> str:
 
 
 def point_colors(cloud: PointCloud, cylinders: int) -> NDArray[np.uint8]:
-    """Give the points of an annotated cloud the colours of their cylinders; those of any other cloud are grey.
+    """Return the points of an annotated cloud the colours of their cylinders; those of any other cloud are grey.
 
     Parameters
     ----------

@@ -78,7 +78,7 @@ def read_catalogue(path: str | PathLike[str]) -> list[dict[str, object]]:
 
 
 def entries_of(given: Given | str | PathLike[str]) -> object:
-    """Give a catalogue as the configuration has it, whichever way it was given: in a file, as entries, or as radii.
+    """Return a catalogue as the configuration has it, whichever way it was given: in a file, as entries, or as radii.
 
     What is none of these is left for the validation to name.
     """
@@ -88,7 +88,7 @@ def entries_of(given: Given | str | PathLike[str]) -> object:
 
 
 def _plain_entry(entry: object) -> object:
-    """Give one entry as a mapping; numpy's numbers are not those of YAML."""
+    """Return one entry as a mapping; numpy's numbers are not those of YAML."""
     if isinstance(entry, CatalogueEntry):
         return entry.model_dump()
     if isinstance(entry, Mapping):
@@ -118,7 +118,7 @@ def _text_of(path: Path, place: str) -> str:
 
 
 def _entries_of_yaml(text: str, place: str) -> Iterator[tuple[int, dict[str, object]]]:
-    """Give each entry of a YAML list with its line."""
+    """Yield each entry of a YAML list with its line."""
     entries = parse_yaml(text, place)
     if entries is None:
         return
@@ -131,7 +131,7 @@ def _entries_of_yaml(text: str, place: str) -> Iterator[tuple[int, dict[str, obj
 
 
 def _entries_of_table(text: str, place: str) -> Iterator[tuple[int, dict[str, object]]]:
-    """Give each entry of a table with its line; `#` at the beginning of a line makes it a comment."""
+    """Yield each entry of a table with its line; `#` at the beginning of a line makes it a comment."""
     table = None
     for number, line in enumerate(text.split("\n"), 1):
         if not line.strip() or line.lstrip().startswith("#"):

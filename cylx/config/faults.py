@@ -32,7 +32,7 @@ _KINDS = {
 
 
 def describe_fault(error: ValidationError, model: type[BaseModel]) -> tuple[tuple[str, ...], str, str]:
-    """Say what the first fault of a failed validation is.
+    """Return what the first fault of a failed validation is.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def describe_fault(error: ValidationError, model: type[BaseModel]) -> tuple[tupl
 
 
 def describe_faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple[str, ...], str, str]]:
-    """Say what all faults of a failed validation are, one of each path, as `describe_fault` does of the first."""
+    """Return what all faults of a failed validation are, one of each path, as `describe_fault` does of the first."""
     found: dict[tuple[str, ...], tuple[str, str]] = {}
     for details in error.errors(include_url=False):
         path = tuple(str(part) for part in details["loc"])
@@ -101,7 +101,7 @@ def _suggest_key(path: tuple[str, ...], model: type[BaseModel]) -> str:
 
 
 def _model_at(path: tuple[str, ...], model: type[BaseModel]) -> type[BaseModel]:
-    """Give the model of the section, or of the entry of a list, that a path leads to."""
+    """Return the model of the section, or of the entry of a list, that a path leads to."""
     for part in path:
         field = model.model_fields.get(part)  # the number of an entry is no field, and leads no further
         model = model if field is None else _model_in(field.annotation) or model
@@ -109,7 +109,7 @@ def _model_at(path: tuple[str, ...], model: type[BaseModel]) -> type[BaseModel]:
 
 
 def _model_in(annotation: object) -> type[BaseModel] | None:
-    """Give the model that an annotation speaks of: itself, or of the entries of a list."""
+    """Return the model that an annotation speaks of: itself, or of the entries of a list."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next(filter(None, map(_model_in, get_args(annotation))), None)

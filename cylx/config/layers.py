@@ -86,7 +86,7 @@ def named_options(
     catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
 ) -> dict[str, object]:
-    """Give the dotted keys that the named options of the command line and of `cylx.extract` stand for.
+    """Return the dotted keys that the named options of the command line and of `cylx.extract` stand for.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def named_options(
 
 
 def _axis(axis: Sequence[float] | str) -> object:
-    """Give a direction as the file would have it; what is none is left for the validation to name."""
+    """Return a direction as the file would have it; what is none is left for the validation to name."""
     if isinstance(axis, str):
         return _AXES.get(axis, axis)
     return [x.item() if hasattr(x, "item") else x for x in axis]  # numpy's numbers are not those of YAML

@@ -60,7 +60,7 @@ def parse_yaml(text: str, place: str) -> object:
 
 
 def entry_lines(text: str) -> list[int]:
-    """Give the line of each entry of a list that `parse_yaml` has read."""
+    """Return the line of each entry of a list that `parse_yaml` has read."""
     node = yaml.compose(text, Loader=yaml.SafeLoader)
     return [item.start_mark.line + 1 for item in node.value] if isinstance(node, yaml.SequenceNode) else []
 

@@ -66,7 +66,7 @@ def _comment(entry: _Object, indent: str) -> Iterator[str]:
 
 
 def _allowed(entry: _Object) -> str:
-    """Say which values a key may have."""
+    """Return which values a key may have."""
     if "anyOf" in entry:
         return " or ".join(_allowed(choice) for choice in entry["anyOf"])
     if "$ref" in entry:

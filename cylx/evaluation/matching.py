@@ -52,7 +52,7 @@ class CylinderTable:
         return np.asarray(finite & np.isfinite(self.radii))
 
     def subset(self, chosen: MaskArray) -> CylinderTable:
-        """Give the chosen ones."""
+        """Return the chosen ones."""
         ids = tuple(id_ for id_, wanted in zip(self.ids, chosen, strict=True) if wanted)
         return CylinderTable(
             ids=ids,

@@ -108,7 +108,7 @@ class Comparison:
         return not self.differences
 
     def to_dict(self) -> dict[str, object]:
-        """Give everything as a JSON object."""
+        """Return everything as a JSON object."""
         return {
             "same": self.same,
             "cylinders_a": self.cylinders_a,
@@ -119,7 +119,7 @@ class Comparison:
 
 
 def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tolerances = Tolerances()) -> Comparison:
-    """Say whether two results are the same cylinders, in whatever order.
+    """Return whether two results are the same cylinders, in whatever order.
 
     Heights and inliers are compared where both results have them. A difference equal to its tolerance is allowed.
 
@@ -169,7 +169,7 @@ def _mutual_errors(left: CylinderTable, right: CylinderTable) -> PairErrors:
 def _same_cylinders(
     left: CylinderTable, right: CylinderTable, errors: PairErrors, tolerances: Tolerances
 ) -> dict[int, int]:
-    """Say which position in b is that in a: about the same axis and radius, and side by side along it."""
+    """Return which position in b is that in a: about the same axis and radius, and side by side along it."""
     lengths = _lengths(left)[:, None], _lengths(right)
     beside = 0.5 * (1 + np.minimum(*lengths) / np.maximum(*lengths))
     limited = (
@@ -214,5 +214,5 @@ def _differences(
 
 
 def _lengths(table: CylinderTable) -> FloatArray:
-    """Give height plus radius: what differences along the axis are measured in."""
+    """Return height plus radius: what differences along the axis are measured in."""
     return np.asarray(np.nan_to_num(table.heights) + table.radii)

@@ -86,7 +86,7 @@ class Evaluation:
     false: tuple[int, ...]
 
     def to_dict(self) -> dict[str, object]:
-        """Give everything as a JSON object, keys in the order above."""
+        """Return everything as a JSON object, keys in the order above."""
         return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
 
 

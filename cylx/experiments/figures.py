@@ -90,21 +90,21 @@ class Figure(NamedTuple):
 
 
 def _single(**changes: float) -> tuple[tuple[str, float], ...]:
-    """Give the parameters of a synthetic cylinder."""
+    """Return the parameters of a synthetic cylinder."""
     return tuple({"points": POINTS, "height": HEIGHT, **changes}.items())
 
 
 def _of_methods(
     panel: str, x: float, scene: tuple[tuple[str, float], ...], planes: int, settings: tuple[str, ...] = _UNIT
 ) -> Iterator[Cell]:
-    """Give the cells of all methods at one place."""
+    """Yield the cells of all methods at one place."""
     for method in METHODS:
         own = () if method == "auto" else (*_slices(planes, scene), *settings)
         yield Cell(panel, method, x, method, scene, own)
 
 
 def _slices(planes: int, scene: tuple[tuple[str, float], ...]) -> tuple[str, ...]:
-    """Give the settings of the paper's own method, which the line fit shares."""
+    """Return the settings of the paper's own method, which the line fit shares."""
     tolerance = max(0.06, 4 * dict(scene)["sigma"])
     slices = (f"slicing.planes={planes}", "slicing.thickness=0.05", f"ellipses.tolerance={tolerance:g}")
     return *slices, *_ANY_CLUSTER
@@ -154,7 +154,7 @@ def _figure_10() -> Iterator[Cell]:
 
 
 def _of_scan_methods(panel: str, x: float, scene: dict[str, float], planes: int, iterations: int) -> Iterator[Cell]:
-    """Give the cells of all methods that find several cylinders; distances are put in with the scan's size."""
+    """Yield the cells of all methods that find several cylinders; distances are put in with the scan's size."""
     normals = ("msac.neighbours=80", "tran.neighbours=80", f"msac.iterations={iterations}")
     for method in METHODS:
         if method != "line-fit":

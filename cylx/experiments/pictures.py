@@ -76,7 +76,7 @@ def draw(figure: Figure, summaries: list[Summary], trials: Trials) -> bytes:
 
 
 def _shown(figure: Figure) -> tuple[str, ...]:
-    """Give the quantities a kind of figure shows."""
+    """Return the quantities a kind of figure shows."""
     if figure.kind == "cylinder":
         return QUANTITIES[:3]
     return QUANTITIES[:1] if figure.kind == "cans" else QUANTITIES[3:]
@@ -103,7 +103,7 @@ def _curves(axes: Axes, here: list[Summary], quantity: str, _trials: Trials) -> 
 
 
 def _style(summary: Summary, family: list[str]) -> dict[str, Any]:
-    """Give a method its colour; several curves of one method differ in shade."""
+    """Return a method its colour; several curves of one method differ in shade."""
     if len(family) > 1:
         return {"color": SHADES[family.index(summary.cell.curve) % len(SHADES)]}
     if summary.cell.curve == UNSURE:  # behind the default itself

@@ -62,7 +62,7 @@ class Summary(NamedTuple):
 
 
 def tasks_of(figure: Figure, trials: int, done: Trials) -> list[Task]:
-    """Give the trials of a figure that are not done, all cells' first trials first."""
+    """Return the trials of a figure that are not done, all cells' first trials first."""
     return [Task(cell, trial) for trial in range(trials) for cell in figure.cells if Key.of(cell, trial) not in done]
 
 
@@ -119,7 +119,7 @@ def summarize(figure: Figure, trials: Trials) -> list[Summary]:
 
 
 def bound_of(figure: Figure, cell: Cell) -> tuple[float, ...] | None:
-    """Give the least mean errors of a cell, of figures that measure errors of one synthetic cylinder."""
+    """Return the least mean errors of a cell, of figures that measure errors of one synthetic cylinder."""
     if figure.kind != "cylinder":
         return None
     scene = dict(cell.scene)

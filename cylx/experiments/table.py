@@ -73,12 +73,12 @@ def parse_trials(text: str, made_by: str | None = __version__) -> Trials | None:
 
 
 def header_line() -> str:
-    """Give the first line of the file."""
+    """Return the first line of the file."""
     return ",".join(COLUMNS) + "\n"
 
 
 def trial_lines(trials: Iterable[tuple[Key, Outcome]], made_by: str = __version__) -> str:
-    """Give the lines of some trials, made by this version of cylx or with some scan; not measured is empty."""
+    """Return the lines of some trials, made by this version of cylx or with some scan; not measured is empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     for key, outcome in trials:

@@ -139,5 +139,5 @@ def _cans_outcome(centers: FloatArray, found: Extraction, seconds: float) -> Out
 
 
 def _angle_deg(u: FloatArray, v: FloatArray) -> float:
-    """Give the angle between two axes, degrees."""
+    """Return the angle between two axes, degrees."""
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(u, v)), abs(float(u @ v)))))

@@ -64,7 +64,7 @@ class _Model:
             self.root("IfcRelContainedInSpatialStructure", "scan", RelatedElements=segments, RelatingStructure=building)
 
     def text(self) -> str:
-        """Give the file, without the time it was written at."""
+        """Return the file, without the time it was written at."""
         header = self.file.header
         header.file_description.description = ("ViewDefinition [ReferenceView]",)
         header.file_name.name = "cylx"
@@ -126,7 +126,7 @@ class _Model:
         return segment
 
     def paint(self, solid: object, piece: Piece) -> None:
-        """Give a solid its colour."""
+        """Return a solid its colour."""
         color = self.make("IfcColourRgb", None, *(part / 255 for part in piece.color))
         shading = self.make("IfcSurfaceStyleShading", color, 0.0)
         style = self.make("IfcSurfaceStyle", piece.name, "BOTH", [shading])

@@ -57,7 +57,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
 
 
 def mesh_of(cylinder: Cylinder) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Give the corners and triangles of a closed prism about the middle of a cylinder, seen from outside.
+    """Return the corners and triangles of a closed prism about the middle of a cylinder, seen from outside.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def mesh_of(cylinder: Cylinder) -> tuple[NDArray[np.float64], NDArray[np.int64]]
 
 
 def offset_for_singles(shapes: list[Cylinder]) -> tuple[float, float, float] | None:
-    """Give what has to be taken off the coordinates before they fit into single precision, None if they do.
+    """Return what has to be taken off the coordinates before they fit into single precision, None if they do.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def _glb(drawing: Drawing) -> bytes:
 
 
 def _colored(piece: Piece, scale: float) -> Trimesh:
-    """Give the mesh of one cylinder about its middle, with a material of its colour."""
+    """Return the mesh of one cylinder about its middle, with a material of its colour."""
     from trimesh import Trimesh  # noqa: PLC0415  an extra
     from trimesh.visual import TextureVisuals  # noqa: PLC0415  an extra
     from trimesh.visual.material import PBRMaterial  # noqa: PLC0415  an extra

@@ -12,7 +12,7 @@ FloatArray = NDArray[np.float64]
 
 
 def outlier_information(sigma: float, sigma_o: float, p: float) -> float:
-    """Give what noise with outliers tells of a location, as a share of what Gaussian noise would.
+    """Return what noise with outliers tells of a location, as a share of what Gaussian noise would.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def outlier_information(sigma: float, sigma_o: float, p: float) -> float:
 
 
 def covariance_bound(points: int, height: float, theta: float, sigma: float, information: float = 1.0) -> FloatArray:
-    """Give the bound on the covariance of a cylinder of unit radius, from points even over an arc and its height.
+    """Return the bound on the covariance of a cylinder of unit radius, from points even over an arc and its height.
 
     A point at angle phi and height z tells of (cos phi, sin phi, z cos phi, z sin phi, 1) times the parameters, with
     noise sigma.
@@ -76,7 +76,7 @@ def covariance_bound(points: int, height: float, theta: float, sigma: float, inf
 
 
 def mean_length(covariance: FloatArray) -> float:
-    """Give the mean length of a Gaussian vector in the plane: sqrt(pi/2) times the mean deviation over directions.
+    """Return the mean length of a Gaussian vector in the plane: sqrt(pi/2) times the mean deviation over directions.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def mean_length(covariance: FloatArray) -> float:
 def mean_errors_at_bound(
     points: int, height: float, theta: float, sigma: float, sigma_o: float, p: float
 ) -> tuple[float, float, float]:
-    """Give the least mean errors: of the axis in degrees, of its place in radii, of the radius in percent.
+    """Return the least mean errors: of the axis in degrees, of its place in radii, of the radius in percent.
 
     Parameters
     ----------

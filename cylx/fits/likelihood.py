@@ -208,12 +208,12 @@ class _Sums:
             matrix[np.diag_indices(5)] += precisions
 
     def one_sidedness(self) -> float:
-        """Give chi-square of five degrees of freedom of the outliers about the surface."""
+        """Return chi-square of five degrees of freedom of the outliers about the surface."""
         scores = self.outer_scores + 1e-9 * np.trace(self.outer_scores) * np.eye(5)
         return float(self.outer_right @ np.linalg.lstsq(scores, self.outer_right, rcond=None)[0])
 
     def covariance(self) -> FloatArray | None:
-        """Give the covariance of an M-estimator, for heights in units of length; None if it is not determined."""
+        """Return the covariance of an M-estimator, for heights in units of length; None if it is not determined."""
         try:
             inverse = np.linalg.inv(self.slopes)
         except np.linalg.LinAlgError:

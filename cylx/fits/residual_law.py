@@ -104,7 +104,7 @@ def _maximise(
 
 
 def _posterior(squares: FloatArray, narrow: float, broad: float, share: float) -> FloatArray:
-    """Give the probability that residuals of these squares are outliers, from the two variances."""
+    """Return the probability that residuals of these squares are outliers, from the two variances."""
     if share <= 0.0:
         return np.zeros_like(squares)
     ratio = (1.0 - share) / share * math.sqrt(broad / narrow)

@@ -25,7 +25,7 @@ SAME = 0.15, math.cos(math.radians(6.0)), 0.1
 
 
 def least_telling(segment: Segment) -> float:
-    """Give the radius from which a window can tell a cylinder."""
+    """Return the radius from which a window can tell a cylinder."""
     return float(WITNESS * min(segment.model[6], 1.2 * segment.half))
 
 
@@ -65,7 +65,7 @@ class Neighbourhood:
     def agreeing(
         self, segment: Segment, alive: NDArray[np.bool_], offset: float, angle_deg: float, radius: float
     ) -> IndexArray:
-        """Give those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
+        """Return those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
         reach = segment.half + float(segment.model[6])
         part = self._beside(segment, reach)
         found = np.empty(part.stop - part.start, np.int64)
@@ -76,7 +76,7 @@ class Neighbourhood:
         return found[:n]
 
     def _beside(self, segment: Segment, reach: float) -> slice:
-        """Give those that a cylinder as long as this may hold."""
+        """Return those that a cylinder as long as this may hold."""
         x, width = float(segment.model[0]), abs(float(segment.model[3])) * reach + float(segment.model[6])
         first, last = np.searchsorted(self._models[:, 0], [x - width, x + width])
         return slice(int(first), int(last))

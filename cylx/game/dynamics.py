@@ -185,17 +185,17 @@ class SparsePayoff:
         return cls(pointers, columns.astype(np.int64), payoff[rows, columns])
 
     def row(self, i: int) -> tuple[IndexArray, FloatArray]:
-        """Give the columns and payoffs of row i."""
+        """Return the columns and payoffs of row i."""
         part = slice(self.pointers[i], self.pointers[i + 1])
         return self.indices[part], self.values[part]
 
     def degrees(self) -> FloatArray:
-        """Give the sum of each row, shape (M,)."""
+        """Return the sum of each row, shape (M,)."""
         rows = np.repeat(np.arange(len(self._place)), np.diff(self.pointers))
         return np.asarray(np.bincount(rows, self.values, minlength=len(self._place)), dtype=np.float64)
 
     def block(self, nodes: IndexArray) -> FloatArray:
-        """Give the payoffs among a few strategies, shape (m, m)."""
+        """Return the payoffs among a few strategies, shape (m, m)."""
         out = np.zeros((len(nodes), len(nodes)))
         _fill_block(self.pointers, self.indices, self.values, nodes, self._place, out)
         return out

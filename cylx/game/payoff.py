@@ -25,7 +25,7 @@ REACH = 4.0
 
 
 def screw_payoff(models: FloatArray, parents: IndexArray, scale: float, min_ratio: float) -> FloatArray:
-    """Give the paper's payoff (eq. 2, 5 and 6) of all pairs, shape (M, M), with a zero diagonal.
+    """Return the paper's payoff (eq. 2, 5 and 6) of all pairs, shape (M, M), with a zero diagonal.
 
     Lengths are measured in the median radius of the candidates and from the middle of their points: eq. 1 mixes radians
     with lengths and depends on the origin, and so the paper's own experiments, a cylinder of radius 1 at the origin,
@@ -63,7 +63,7 @@ def local_payoff(
     min_ratio: float,
     threads: int = 1,
 ) -> SparsePayoff:
-    """Give the payoffs of all pairs within reach: angle, offset at the candidates in radii, ratio of radii.
+    """Return the payoffs of all pairs within reach: angle, offset at the candidates in radii, ratio of radii.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def local_payoff(
 
 @njit(cache=True, nogil=True)
 def _first_from(models: FloatArray, low: int, high: int, x: float) -> int:
-    """Give the first of the models low..high, sorted by x, that is not below `x`."""
+    """Return the first of the models low..high, sorted by x, that is not below `x`."""
     while low < high:
         middle = (low + high) >> 1
         if models[middle, 0] < x:
@@ -144,7 +144,7 @@ def _pairs(
     least_ratio: float,
     widths: tuple[float, float, float],
 ) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """Give the pairs of the candidates first..last of one bin with those after them in it and in later bins."""
+    """Return the pairs of the candidates first..last of one bin with those after them in it and in later bins."""
     n, room = 0, 1024
     rows, columns, values = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
     for b in range(own, len(bins)):
@@ -174,7 +174,7 @@ def _pairs(
 
 @njit(cache=True, nogil=True)
 def _grown(values: NDArray[Any]) -> NDArray[Any]:
-    """Give an array twice as long that begins with the same values."""
+    """Return an array twice as long that begins with the same values."""
     out = np.empty(2 * len(values), values.dtype)
     for i in range(len(values)):
         out[i] = values[i]
@@ -210,7 +210,7 @@ def _enter(
 def _play(
     one: FloatArray, other: FloatArray, reach: float, least_ratio: float, widths: tuple[float, float, float]
 ) -> float:
-    """Give the payoff of two candidates, 0 if they are out of reach or incompatible."""
+    """Return the payoff of two candidates, 0 if they are out of reach or incompatible."""
     bound = -math.log(CUT)
     dx, dy, dz = other[0] - one[0], other[1] - one[1], other[2] - one[2]
     square = dx * dx + dy * dy + dz * dz

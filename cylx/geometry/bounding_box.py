@@ -12,14 +12,14 @@ FloatArray = NDArray[np.float64]
 
 
 def box_of(points: FloatArray) -> FloatArray:
-    """Give the least and the greatest coordinates, shape (2, 3)."""
+    """Return the least and the greatest coordinates, shape (2, 3)."""
     box = np.empty((2, 3))
     _fill_box(points, box)
     return box
 
 
 def extent_of(points: FloatArray) -> float:
-    """Give the diagonal of the bounding box."""
+    """Return the diagonal of the bounding box."""
     return float(np.linalg.norm(np.ptp(box_of(points), axis=0)))
 
 
@@ -34,7 +34,7 @@ def _fill_box(points: FloatArray, box: FloatArray) -> None:
 
 @njit(cache=True, nogil=True)
 def widest_deviation(points: FloatArray, low: FloatArray) -> float:
-    """Give the mean absolute deviation from the mean, of the coordinate where it is greatest."""
+    """Return the mean absolute deviation from the mean, of the coordinate where it is greatest."""
     widest = 0.0
     for d in range(3):
         mean, total = 0.0, 0.0

@@ -40,7 +40,7 @@ class Cells:
         self._blocks = _balls_of(points, np.append(self._starts[:-1:BLOCK], self._starts[-1]))
 
     def near_cylinder(self, model: FloatArray, low: float, high: float, inner: float, outer: float) -> IndexArray:
-        """Give the points between two heights and two distances from an axis.
+        """Return the points between two heights and two distances from an axis.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Cells:
         marks: FloatArray,
         limit: float,
     ) -> FloatArray:
-        """Give the points near a cylinder's surface, about `most` of them, whose mark is below a limit.
+        """Return the points near a cylinder's surface, about `most` of them, whose mark is below a limit.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ def _copy_marked(
 
 
 def _balls_of(points: FloatArray, starts: IndexArray) -> FloatArray:
-    """Give centre and radius of a ball about each run of points, shape (C, 4)."""
+    """Return centre and radius of a ball about each run of points, shape (C, 4)."""
     balls = np.empty((len(starts) - 1, 4))
     _fill_balls(points, starts, balls)
     return balls
@@ -133,7 +133,7 @@ def _fill_balls(points: FloatArray, starts: IndexArray, balls: FloatArray) -> No
 def _apart(
     x: float, y: float, z: float, reach: float, model: FloatArray, low: float, high: float, inner: float, outer: float
 ) -> bool:
-    """Tell whether a ball of radius `reach` lies outside the hollow cylinder altogether."""
+    """Return whether a ball of radius `reach` lies outside the hollow cylinder altogether."""
     dx, dy, dz = x - model[0], y - model[1], z - model[2]
     height = dx * model[3] + dy * model[4] + dz * model[5]
     if height < low - reach or height > high + reach:

@@ -128,7 +128,7 @@ def _improve(points: FloatArray, shape: FloatArray, steps: int) -> bool:
 
 
 def _taubin(points: FloatArray) -> tuple[FloatArray, float]:
-    """Give Taubin's circle of centred points by Newton's method on its characteristic polynomial (Chernov, 2010)."""
+    """Return Taubin's circle of centred points by Newton's method on its characteristic polynomial (Chernov, 2010)."""
     x, y = points[:, 0], points[:, 1]
     z = x * x + y * y
     xx, yy, xy = float((x * x).mean()), float((y * y).mean()), float((x * y).mean())

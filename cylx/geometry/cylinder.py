@@ -69,7 +69,7 @@ class Cylinder:
         return self.point + 0.5 * self.height * self.direction
 
     def moved(self, origin: ArrayLike, scale: float = 1.0) -> Cylinder:
-        """Give the cylinder where x -> scale x + origin takes its points."""
+        """Return the cylinder where x -> scale x + origin takes its points."""
         return Cylinder(
             scale * self.point + np.asarray(origin), self.direction, scale * self.radius, scale * self.height
         )
@@ -99,7 +99,7 @@ def canonical_direction(direction: ArrayLike) -> FloatArray:
 def cylinder_coordinates(
     points: FloatArray, point: ArrayLike, direction: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give each point's height along the axis, distance from the axis and angle about it.
+    """Return each point's height along the axis, distance from the axis and angle about it.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def cylinder_coordinates(
 
 
 def axis_frame(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Give two unit vectors that make a right-handed frame with a unit direction.
+    """Return two unit vectors that make a right-handed frame with a unit direction.
 
     Returns
     -------
@@ -141,7 +141,7 @@ def axis_frame(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def surface_distances(points: FloatArray, cylinder: Cylinder) -> FloatArray:
-    """Give the signed distance of each point to the infinite cylinder's surface, + is outside.
+    """Return the signed distance of each point to the infinite cylinder's surface, + is outside.
 
     Parameters
     ----------
@@ -157,7 +157,7 @@ def surface_distances(points: FloatArray, cylinder: Cylinder) -> FloatArray:
 
 
 def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
-    """Give heights and angles of the points within `width` of a cylinder's surface.
+    """Return heights and angles of the points within `width` of a cylinder's surface.
 
     Parameters
     ----------
@@ -178,7 +178,7 @@ def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[Floa
 def coordinates_of(
     points: FloatArray, indices: IndexArray, model: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give heights, signed distances to a cylinder's surface, and angles of some of the points, shape (n,) each."""
+    """Return heights, signed distances to a cylinder's surface, and angles of some of the points, shape (n,) each."""
     heights, residuals, angles = np.empty(len(indices)), np.empty(len(indices)), np.empty(len(indices))
     fill_coordinates(points[indices], model, math.inf, heights, residuals, angles)
     return heights, residuals, angles

@@ -29,7 +29,7 @@ def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def conjugate(q: FloatArray) -> FloatArray:
-    """Give the quaternion conjugate of both parts: the inverse of a unit dual quaternion."""
+    """Return the quaternion conjugate of both parts: the inverse of a unit dual quaternion."""
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0]))
 
 
@@ -41,7 +41,7 @@ def normalised(q: FloatArray) -> FloatArray:
 
 
 def screw(axis: FloatArray, foot: FloatArray, angle: FloatArray, shift: FloatArray) -> FloatArray:
-    """Give the motion that turns by `angle` about the line (foot, axis) and moves by `shift` along it (A.2).
+    """Return the motion that turns by `angle` about the line (foot, axis) and moves by `shift` along it (A.2).
 
     The text of (A.2) has the dual angle 2 beta + 2 eps |T|, whose half in the cosine would apply the motion twice; the
     dual angle meant is beta + eps |T|.
@@ -67,7 +67,7 @@ def screw(axis: FloatArray, foot: FloatArray, angle: FloatArray, shift: FloatArr
 
 
 def logarithm(q: FloatArray) -> FloatArray:
-    """Give the logarithm of unit dual quaternions: half the dual angle times the dual axis (A.3).
+    """Return the logarithm of unit dual quaternions: half the dual angle times the dual axis (A.3).
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def logarithm(q: FloatArray) -> FloatArray:
 
 
 def exponential(twist: FloatArray) -> FloatArray:
-    """Give the unit dual quaternion whose logarithm is `twist`, shape (..., 6)."""
+    """Return the unit dual quaternion whose logarithm is `twist`, shape (..., 6)."""
     half = np.linalg.norm(twist[..., :3], axis=-1, keepdims=True)
     small = half < 1e-12
     axis = twist[..., :3] / np.where(small, 1.0, half)
@@ -110,7 +110,7 @@ def exponential(twist: FloatArray) -> FloatArray:
 def line_screws(
     point: FloatArray, direction: FloatArray, points: FloatArray, directions: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give the smallest screw from one line to each of several (section 3.1, A.2).
+    """Return the smallest screw from one line to each of several (section 3.1, A.2).
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def line_screws(
 
 
 def pairwise_screw_distances(points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give the distance of eq. 1 and the gap |T| of all pairs of lines.
+    """Return the distance of eq. 1 and the gap |T| of all pairs of lines.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Ellipse:
         return np.array([math.cos(self.angle), math.sin(self.angle)])
 
     def conic(self) -> FloatArray:
-        """Give (a, b, c, d, e, f) of a x^2 + b x y + c y^2 + d x + e y + f = 0, negative inside, with a + c = 1."""
+        """Return (a, b, c, d, e, f) of a x^2 + b x y + c y^2 + d x + e y + f = 0, negative inside, with a + c = 1."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         u, v = self.semi_major**-2, self.semi_minor**-2
         a, b = u * cosine**2 + v * sine**2, 2.0 * cosine * sine * (u - v)
@@ -114,7 +114,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
 
 
 def _from_conic(conic: FloatArray) -> tuple[FloatArray, float, float, float] | None:
-    """Give centre, semi-axes and angle of a conic, None if it is no real ellipse."""
+    """Return centre, semi-axes and angle of a conic, None if it is no real ellipse."""
     shape = np.empty(5)
     if not conic_shape(np.asarray(conic, dtype=np.float64), shape):
         return None
@@ -143,7 +143,7 @@ def conic_shape(conic: FloatArray, shape: FloatArray) -> bool:
 
 
 def ellipse_distances(ellipse: Ellipse, points: FloatArray) -> FloatArray:
-    """Give signed first-order (Sampson) distances of points to an ellipse, + is outside.
+    """Return signed first-order (Sampson) distances of points to an ellipse, + is outside.
 
     Parameters
     ----------

@@ -119,7 +119,7 @@ def _fill_shares(
     pieces: int,
     least: FloatArray,
 ) -> FloatArray:
-    """Give the share of the arc's bins that hold a point, for each piece of the height; 0 for those too faint."""
+    """Return the share of the arc's bins that hold a point, for each piece of the height; 0 for those too faint."""
     occupied = np.zeros((pieces, ARC_BINS), np.bool_)
     shares, counts = np.zeros(pieces), np.zeros(pieces)
     for i in range(len(heights)):
@@ -140,7 +140,7 @@ def _fill_shares(
 def _choose_run(
     shares: FloatArray, pieces: int, piece: float, first: float, half: float, filled: FloatArray, bridge: float
 ) -> tuple[int, int]:
-    """Give first and last piece of the run of filled ones that overlaps the known height most; gaps are bridged."""
+    """Return first and last piece of the run of filled ones that overlaps the known height most; gaps are bridged."""
     inside, scratch, n = np.empty(pieces), np.empty(pieces), np.int64(0)
     for p in range(pieces):
         if abs((first + p + 0.5) * piece) <= half + 0.5 * piece:

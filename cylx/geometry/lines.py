@@ -22,7 +22,7 @@ PARALLEL = 1e-8
 def common_perpendicular(
     first_points: FloatArray, first_directions: FloatArray, second_points: FloatArray, second_directions: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Give the feet, the angle and the axis of the shortest motion from one line to another, for pairs of lines.
+    """Return the feet, the angle and the axis of the shortest motion from one line to another, for pairs of lines.
 
     Directions are taken up to sign, so the angle is at most a right angle.
 
@@ -74,7 +74,7 @@ def common_perpendicular(
 
 
 def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> NDArray[np.bool_]:
-    """Tell which directions are parallel to an axis within an angle; signs do not matter.
+    """Return which directions are parallel to an axis within an angle; signs do not matter.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def fit_line(xyz: FloatArray, n: int, reach: float, place: FloatArray, direction
 
 @njit(cache=True, nogil=True)
 def off_line(xyz: FloatArray, i: int, mean: FloatArray, direction: FloatArray) -> float:
-    """Give the distance of point i from a line."""
+    """Return the distance of point i from a line."""
     dx, dy, dz = xyz[0, i] - mean[0], xyz[1, i] - mean[1], xyz[2, i] - mean[2]
     along = dx * direction[0] + dy * direction[1] + dz * direction[2]
     return math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - along * along))

@@ -42,7 +42,7 @@ def _fill_codes(points: FloatArray, unit: float, most: float, codes: IndexArray)
 
 
 def morton_codes(points: FloatArray, unit: float, most: float | None = None) -> IndexArray:
-    """Give the Morton code of each point's cell.
+    """Return the Morton code of each point's cell.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def morton_codes(points: FloatArray, unit: float, most: float | None = None) -> 
 
 @njit(cache=True, nogil=True)
 def find_cell(cells: IndexArray, code: int) -> int:
-    """Give the position of `code` among the sorted `cells`, -1 if that cell is empty."""
+    """Return the position of `code` among the sorted `cells`, -1 if that cell is empty."""
     low, high = 0, len(cells)
     while low < high:
         middle = (low + high) >> 1
@@ -143,7 +143,7 @@ def gather_ball(
 
 
 def cell_starts(codes: IndexArray, level: int) -> tuple[IndexArray, IndexArray]:
-    """Give the occupied cells of one level and where each one's run of points begins.
+    """Return the occupied cells of one level and where each one's run of points begins.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def cell_starts(codes: IndexArray, level: int) -> tuple[IndexArray, IndexArray]:
 
 
 def group(codes: IndexArray, level: int, keep: NDArray[np.bool_]) -> tuple[IndexArray, IndexArray, IndexArray]:
-    """Give the points to keep, the occupied cells of one level, and where each one's run of these points begins.
+    """Return the points to keep, the occupied cells of one level, and where each one's run of these points begins.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ def thin(codes: IndexArray, level: int, keep: NDArray[np.bool_] | None = None) -
 
 
 def pick_one(cells: IndexArray, starts: IndexArray) -> IndexArray:
-    """Give one index of each cell's run, pseudo-randomly by the cell's code, shape (C,)."""
+    """Return one index of each cell's run, pseudo-randomly by the cell's code, shape (C,)."""
     # a multiplicative hash: the choice depends on the place alone, not on the order of the points or on a generator
     hashed = ((cells * GOLDEN) & 0x7FFFFFFFFFFFFFFF) >> 32
     return np.asarray(starts[:-1] + hashed % np.diff(starts), dtype=np.int64)

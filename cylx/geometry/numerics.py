@@ -123,7 +123,7 @@ def fill_frame(direction: FloatArray, frame: FloatArray) -> None:
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Give a x b of vectors in the last axis, (..., 3) each; `numpy.cross` takes ten times as long for few vectors."""
+    """Return a x b of vectors in the last axis, (..., 3) each; ten times faster than `numpy.cross` for few vectors."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
@@ -147,7 +147,7 @@ def sort_in_place(values: FloatArray, n: int) -> None:
 
 @njit(cache=True, nogil=True)
 def median_of_positive(values: FloatArray, n: int, scratch: FloatArray) -> float:
-    """Give the median of those of values[:n] that are positive; 0 if there are none."""
+    """Return the median of those of values[:n] that are positive; 0 if there are none."""
     m = np.int64(0)  # of a literal a kernel of its own would be compiled
     for i in range(n):
         if values[i] > 0.0:

@@ -28,20 +28,20 @@ class Plane:
     normal: FloatArray
 
     def heights(self, points: FloatArray) -> FloatArray:
-        """Give signed distances of points (N, 3) from the plane, shape (N,)."""
+        """Return signed distances of points (N, 3) from the plane, shape (N,)."""
         return np.asarray((points - self.point) @ self.normal)
 
     def project(self, points: FloatArray) -> FloatArray:
-        """Give coordinates of points (N, 3) in the plane, along the normal, shape (N, 2)."""
+        """Return coordinates of points (N, 3) in the plane, along the normal, shape (N, 2)."""
         first, second = axis_frame(self.normal)
         return (points - self.point) @ np.column_stack([first, second])
 
     def lift(self, coordinates: FloatArray) -> FloatArray:
-        """Give the points in space of coordinates (..., 2) in the plane, shape (..., 3)."""
+        """Return the points in space of coordinates (..., 2) in the plane, shape (..., 3)."""
         return self.point + self.lift_vectors(coordinates)
 
     def lift_vectors(self, vectors: FloatArray) -> FloatArray:
-        """Give the vectors in space of vectors (..., 2) in the plane, shape (..., 3)."""
+        """Return the vectors in space of vectors (..., 2) in the plane, shape (..., 3)."""
         return np.asarray(vectors @ np.stack(axis_frame(self.normal)))
 
 

@@ -90,7 +90,7 @@ def _fill_plane_sums(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
 def _count_beside(xyz: FloatArray, n: int, width: float, center: FloatArray, normal: FloatArray) -> tuple[float, float]:
-    """Give the number of points within `width` of a plane, and the sum of their squared distances."""
+    """Return the number of points within `width` of a plane, and the sum of their squared distances."""
     cx, cy, cz, nx, ny, nz = center[0], center[1], center[2], normal[0], normal[1], normal[2]
     count, squares = 0.0, 0.0
     for i in range(n):

@@ -116,7 +116,7 @@ def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:
 
 
 def _columns(cloud: PointCloud) -> Mapping[str, NDArray[Any]] | NDArray[np.void]:
-    """Give what the input says of its rows, by name; the rows that an array of points had in excess are NaN."""
+    """Return what the input says of its rows, by name; the rows that an array of points had in excess are NaN."""
     if cloud.table is not None:
         return cloud.table
     return {axis: cloud.spread(cloud.points[:, place], np.nan) for place, axis in enumerate("xyz")}
@@ -136,7 +136,7 @@ def _blocks(
 
 
 def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray[Any]]]]:
-    """Give what was found about the rows, piece by piece, by the names of our properties."""
+    """Yield what was found about the rows, piece by piece, by the names of our properties."""
     cloud = extraction.cloud
     labels = cloud.spread(extraction.labels, -1)
     residuals = cloud.spread(extraction.residuals, np.nan)

@@ -65,12 +65,12 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
 
 
 def recorded_name(path: str | Path) -> str:
-    """Give the name by which a result calls a file: without its folder, in characters that UTF-8 has."""
+    """Return the name by which a result calls a file: without its folder, in characters that UTF-8 has."""
     return Path(_file_name(path)).name
 
 
 def cloud_suffixes() -> tuple[str, ...]:
-    """Give the small suffixes of the files that are taken for clouds in a folder; arrays may be anything."""
+    """Return the small suffixes of the files that are taken for clouds in a folder; arrays may be anything."""
     return (".ply", ".pcd", *TEXT_SUFFIXES, *LAS_SUFFIXES, ".e57")
 
 
@@ -118,7 +118,7 @@ def write_cloud(
 
 
 def _file_name(path: str | Path) -> str:
-    """Give the name of a file as it can be written as UTF-8."""
+    """Return the name of a file as it can be written as UTF-8."""
     return str(path).encode("utf-8", "replace").decode()
 
 
@@ -169,7 +169,7 @@ def _table(points: NDArray[Any], properties: Mapping[str, NDArray[Any]], dtype: 
 
 
 def _plain_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Give the number type, common to PLY and PCD but for integers of 8 bytes, that holds values of a type."""
+    """Return the number type, common to PLY and PCD but for integers of 8 bytes, that holds values of a type."""
     if dtype.kind not in "biuf":
         raise ValueError(f"a property must be made of numbers, not of {dtype}")
     if dtype.kind == "f":

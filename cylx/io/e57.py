@@ -96,7 +96,7 @@ def read_e57(source: Input, scan: int | None = None) -> NDArray[np.void]:
 
 @contextmanager
 def _named(source: Input) -> Iterator[Path]:
-    """Give the name of an input, which libE57 asks for; what has none is copied."""
+    """Yield the name of an input, which libE57 asks for; what has none is copied."""
     if source.path is not None:
         yield source.path
         return
@@ -149,7 +149,7 @@ def _describe(file: Any, number: int, place: str) -> _Scan:  # noqa: ANN401  (of
 
 
 def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa: ANN401  (of pye57)
-    """Give rotation (3, 3) and translation (3,) of a scan; by name, as their order in the file is not fixed."""
+    """Return rotation (3, 3) and translation (3,) of a scan; by name, as their order in the file is not fixed."""
     rotation, translation = np.eye(3), np.zeros(3)
     if not node.isDefined("pose"):
         return rotation, translation
@@ -173,7 +173,7 @@ def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa
 
 
 def _type(node: Any) -> np.dtype[Any] | None:  # noqa: ANN401  (of pye57)
-    """Give the smallest type that holds all that a field may be; None if it is no number."""
+    """Return the smallest type that holds all that a field may be; None if it is no number."""
     from pye57 import libe57  # noqa: PLC0415  an extra
 
     if isinstance(node, libe57.FloatNode):
@@ -229,7 +229,7 @@ def _fill(
 
 
 def _coordinates(read: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
-    """Give the coordinates as the scanner saw them, (n, 3); NaN where they are invalid."""
+    """Return the coordinates as the scanner saw them, (n, 3); NaN where they are invalid."""
     if read.keys() >= set(_CARTESIAN):
         points = np.column_stack([read[name] for name in _CARTESIAN])
         invalid = read.get(_INVALID[0])

@@ -33,7 +33,7 @@ _BEGINNINGS = {
 
 
 def cloud_suffix(path: str | Path) -> str:
-    """Give the suffix of a cloud in small letters; `.gz` is none.
+    """Return the suffix of a cloud in small letters; `.gz` is none.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def cloud_suffix(path: str | Path) -> str:
 
 
 def cloud_name(path: str | Path) -> str:
-    """Give a path without its `.gz`, if it has one.
+    """Return a path without its `.gz`, if it has one.
 
     Examples
     --------

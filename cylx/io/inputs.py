@@ -47,7 +47,7 @@ class Input:
     path: Path | None = None
 
     def head(self, size: int) -> bytes:
-        """Give up to `size` bytes from the beginning."""
+        """Return up to `size` bytes from the beginning."""
         self.file.seek(0)
         return self.file.read(size)
 
@@ -105,7 +105,7 @@ def read_json(path: str | Path) -> dict[str, Any]:
 
 
 def sha256_of(path: str | Path) -> str:
-    """Give the digest of the bytes of a file.
+    """Return the digest of the bytes of a file.
 
     Raises
     ------
@@ -117,7 +117,7 @@ def sha256_of(path: str | Path) -> str:
 
 
 def printable(path: str | Path) -> str:
-    """Give a path as one line that can be printed, whatever is in it."""
+    """Return a path as one line that can be printed, whatever is in it."""
     return text if (text := str(path)).isprintable() else repr(text)
 
 

@@ -36,7 +36,7 @@ class Dimension:
     element: int | None = None
 
     def of(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Give the column's part of the values of its dimension."""
+        """Return the column's part of the values of its dimension."""
         return values if self.element is None else values[:, self.element]
 
 
@@ -65,7 +65,7 @@ def read_las(source: Input) -> NDArray[np.void]:
 
 
 def las_dimensions(point_format: Any) -> list[Dimension]:  # noqa: ANN401  (of laspy)
-    """Say which columns the points of a format have besides x, y and z, in the order of the file."""
+    """Return which columns the points of a format have besides x, y and z, in the order of the file."""
     found = []
     for one in point_format.dimensions:
         if one.name in ("X", "Y", "Z"):

@@ -100,7 +100,7 @@ def _is_colored(header: Any) -> bool:  # noqa: ANN401  (of laspy)
 
 
 def _new_name(name: str, taken: list[str]) -> str:
-    """Give the name to keep a property under, of at most 32 letters, which LAS allows."""
+    """Return the name to keep a property under, of at most 32 letters, which LAS allows."""
     new, count = f"orig_{name}", 1
     while new in taken:
         count += 1

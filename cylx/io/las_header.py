@@ -83,7 +83,7 @@ def las_header(source: Input) -> LasFacts:
 
 
 def kept_header(source: Input, facts: LasFacts) -> bytes:
-    """Give what a LAS file has besides its points, so that it can be written again with others.
+    """Return what a LAS file has besides its points, so that it can be written again with others.
 
     That is the header and all records before the points, and of those after them the small ones: neither waveforms nor
     the index of a COPC file, which would be wrong afterwards.

@@ -116,7 +116,7 @@ def _check_kind(dtype: np.dtype[Any], shape: tuple[int, ...], place: str) -> Non
 
 
 def _columns(array: NDArray[Any], place: str) -> NDArray[np.void]:
-    """Give an array as a structured one of plain columns, without copying it if that can be."""
+    """Return an array as a structured one of plain columns, without copying it if that can be."""
     if array.dtype.names is None:
         names = ["x", "y", "z", *(f"column_{column}" for column in range(4, array.shape[1] + 1))]
         kind = _plain(array.dtype)
@@ -137,7 +137,7 @@ def _columns(array: NDArray[Any], place: str) -> NDArray[np.void]:
 
 
 def _field(array: NDArray[np.void], name: str, place: str) -> list[tuple[str, NDArray[Any]]]:
-    """Give the columns of a field."""
+    """Return the columns of a field."""
     values = array[name]
     if values.dtype.kind not in "biuf":
         fault = f"the field {excerpt(name)} is made of {values.dtype}, not of numbers"
@@ -151,7 +151,7 @@ def _field(array: NDArray[np.void], name: str, place: str) -> list[tuple[str, ND
 
 
 def _plain(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Give the type that files of points have for a type of numpy."""
+    """Return the type that files of points have for a type of numpy."""
     if dtype.kind == "b":
         return np.dtype("u1")
     if dtype.kind == "f" and dtype.itemsize not in (4, 8):

@@ -126,7 +126,7 @@ def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> None:
 
 @contextmanager
 def moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[str | Path]:
-    """Give a temporary name beside `name`, moved there if all goes well, removed if not.
+    """Yield a temporary name beside `name`, moved there if all goes well, removed if not.
 
     A stream or a device has no other name than its own.
     """
@@ -195,7 +195,7 @@ def _machine() -> str:
 
 
 def _has_ended(process: int) -> bool:
-    """Say whether a process is certainly gone; Windows has no way to ask that is not deadly."""
+    """Return whether a process is certainly gone; Windows has no way to ask that is not deadly."""
     if os.name == "nt":
         return False
     try:
@@ -224,7 +224,7 @@ def _target(path: str | Path) -> Path:
 
 
 def _mode(path: str | Path) -> int | None:
-    """Give the type and permissions of what the path leads to, None if there is nothing yet."""
+    """Return the type and permissions of what the path leads to, None if there is nothing yet."""
     try:
         return Path(path).stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

@@ -25,7 +25,7 @@ _REMEDY = "get a complete copy of the file"
 
 @contextmanager
 def unpacked(source: Input, *, packed: bool) -> Iterator[Input]:
-    """Give what a gzip file holds, with the digest of the file as it lies; any other file as it is.
+    """Yield what a gzip file holds, with the digest of the file as it lies; any other file as it is.
 
     Parameters
     ----------

@@ -71,7 +71,7 @@ class _Header:
         return sum(field.width for field in self.fields)
 
     def columns(self) -> list[tuple[str, str, _Field, int]]:
-        """Give the name, type and field of each value of a point, and its place in the field, padding left out."""
+        """Return the name, type and field of each value of a point, and its place in the field, padding left out."""
         kept = [
             (name, field, place)
             for field in self.fields

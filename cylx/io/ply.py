@@ -79,7 +79,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
 
 
 def ply_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Give the type, little endian, that PLY has for a number type; integers of 8 bytes become double."""
+    """Return the type, little endian, that PLY has for a number type; integers of 8 bytes become double."""
     return np.dtype("<f8") if dtype.kind in "iu" and dtype.itemsize > 4 else dtype.newbyteorder("<")
 
 

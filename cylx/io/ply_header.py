@@ -61,7 +61,7 @@ class Element:
         return any(item.length for item in self.properties)
 
     def least_size(self, text: bool) -> int:
-        """Give the bytes that a row takes at least: of a list its length, in text a digit and what ends it."""
+        """Return the bytes that a row takes at least: of a list its length, in text a digit and what ends it."""
         if text:
             return max(2 * len(self.properties), 1)
         return sum(np.dtype(TYPES[item.length or item.type]).itemsize for item in self.properties)
@@ -138,7 +138,7 @@ def _read_lines(source: Input) -> Header:
 
 
 def _header_lines(source: Input) -> Iterator[tuple[int, int, str]]:
-    """Give number, end and text of each line of the header, which may end in LF, CR LF or CR."""
+    """Yield number, end and text of each line of the header, which may end in LF, CR LF or CR."""
     head = source.head(_MOST_HEADER)
     if head[:3] != b"ply" or head[3:4] not in (b"\n", b"\r", b""):
         raise InputError(source.place, "is no PLY: it does not begin with the line 'ply'", "give it its right suffix")

@@ -94,7 +94,7 @@ def short_of_points(place: str, promised: int, found: int, *, at_most: bool = Fa
 
 @contextmanager
 def text_lines(source: Input, offset: int = 0) -> Iterator[io.TextIOWrapper]:
-    """Give the lines of a text from a byte on, with any line ends; bytes that are not UTF-8 come spelled out."""
+    """Yield the lines of a text from a byte on, with any line ends; bytes that are not UTF-8 come spelled out."""
     source.file.seek(offset)
     lines = io.TextIOWrapper(source.file, encoding="utf-8-sig", errors="backslashreplace")
     try:
@@ -131,7 +131,7 @@ def split_row(line: str, delimiter: str | None) -> list[str]:
 
 
 def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
-    """Tell whether a column can be read as a number, and held by a type.
+    """Return whether a column can be read as a number, and held by a type.
 
     Examples
     --------
@@ -166,7 +166,7 @@ def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: in
 
 
 def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]:
-    """Give the lines with one space between columns, until one of them is wrong."""
+    """Yield the lines with one space between columns, until one of them is wrong."""
     names = rows.dtype.names or ()
     yield from ("\n" for _ in range(rows.skip))
     for number, line in enumerate(islice(lines, rows.skip, None), rows.line + rows.skip):
@@ -196,6 +196,6 @@ def check_number(where: str, name: str, column: str, dtype: np.dtype[Any] | None
 
 
 def _most_rows(source: Input, rows: RowFormat) -> int | None:
-    """Give the count of rows, for which memory is taken at once, unless the file has no room: two bytes a column."""
+    """Return the count of rows, for which memory is taken at once, unless the file has no room: two bytes a column."""
     room = (source.size - rows.offset + 1) // (2 * len(rows.dtype.names or ()))
     return rows.count if rows.count is not None and rows.count <= room else None

@@ -44,7 +44,7 @@ def expected_points(path: str | Path) -> int:
 
 
 def _promised(head: bytes) -> int | None:
-    """Give the number in a header, None if there is none."""
+    """Return the number in a header, None if there is none."""
     if head.startswith(b"LASF") and len(head) >= 255:
         long = int.from_bytes(head[247:255], "little") if head[25] >= 4 else 0
         return long or int.from_bytes(head[107:111], "little")

@@ -168,7 +168,7 @@ def _check_first_row(where: str, columns: Sequence[str]) -> None:
 
 
 def _named_in_comment(line: str) -> str:
-    """Give the text of a comment that names x, y and z, or nothing."""
+    """Return the text of a comment that names x, y and z, or nothing."""
     text = line.strip().lstrip("".join(COMMENTS)).strip()
     return text if len(coordinate_names(_words(text))) == 3 else ""
 

@@ -103,7 +103,7 @@ def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | 
 
 
 def estimate_normals(points: NDArray[np.float64], neighbours: int) -> NDArray[np.float64]:
-    """Give the normal of the plane through the nearest neighbours of each point.
+    """Return the normal of the plane through the nearest neighbours of each point.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def show_scene(
 
 
 def _has_display() -> bool:
-    """Say whether a window would be seen; open3d opens one in memory, and waits for ever, where there is no display."""
+    """Return whether a window would be visible; without a display open3d opens one in memory and waits for ever."""
     if not sys.platform.startswith("linux") or os.environ.get("WAYLAND_DISPLAY"):
         return True
     if not os.environ.get("DISPLAY"):

@@ -93,7 +93,7 @@ class Candidates:
         return self.models[:, 6]
 
     def take(self, which: IndexArray | MaskArray) -> Candidates:
-        """Give the candidates at these indices, or under this mask."""
+        """Return the candidates at these indices, or under this mask."""
         return Candidates(
             self.models[which], self.parents[which], self.extents[which], self.inliers[which], self.windows[which]
         )

@@ -265,7 +265,7 @@ class Extraction:
         return html_in_notebook(self)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
-        """Give the cylinders as arrays, in their order.
+        """Return the cylinders as arrays, in their order.
 
         Returns
         -------

@@ -6,7 +6,7 @@ from importlib import import_module
 
 
 def html_in_notebook(found: object) -> str:
-    """Give the page that `cylx.show` makes of an extraction or a result.
+    """Return the page that `cylx.show` makes of an extraction or a result.
 
     It is imported by its name when a notebook asks: what shows records knows them, not they it.
     """

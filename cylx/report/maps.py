@@ -82,7 +82,7 @@ def unroll(
 
 
 def _cells(cylinder: Cylinder, count: int, most: int) -> tuple[int, int]:
-    """Give the columns and rows of a map: cells about square, with some points in each."""
+    """Return the columns and rows of a map: cells about square, with some points in each."""
     cells = float(np.clip(count / POINTS_A_CELL, 8, most))
     shape = 2 * np.pi * cylinder.radius / max(cylinder.height, 1e-9 * cylinder.radius)
     columns = int(np.clip(np.rint(np.sqrt(cells * shape)), 8, MOST_COLUMNS))

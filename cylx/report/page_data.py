@@ -60,7 +60,7 @@ def facts_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str
 
 
 def view_of(scenery: Scenery, most_points: int) -> dict[str, Any]:
-    """Give what is drawn: points, and cylinders relative to the middle of the box.
+    """Return what is drawn: points, and cylinders relative to the middle of the box.
 
     Parameters
     ----------
@@ -102,14 +102,14 @@ def view_of(scenery: Scenery, most_points: int) -> dict[str, Any]:
 
 
 def _unit(scenery: Scenery) -> float:
-    """Give the noise, or what stands for it where the points have none."""
+    """Return the noise, or what stands for it where the points have none."""
     residuals = scenery.residuals[np.isfinite(scenery.residuals)].astype(np.float64)
     scatter = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else 0.0
     return scenery.noise or scatter or 1.0
 
 
 def _home(points: NDArray[np.float64], shapes: NDArray[np.float64]) -> dict[str, Any]:
-    """Give the ball that is looked at first: of all but the most outlying points, and of all cylinders."""
+    """Return the ball that is looked at first: of all but the most outlying points, and of all cylinders."""
     low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
     for ends in (shapes[:, :3], shapes[:, 3:6]):
         low = np.minimum(low, (ends - shapes[:, 6:]).min(axis=0, initial=np.inf))

@@ -102,7 +102,7 @@ def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None 
 
 
 def outline(cylinder: Cylinder) -> list[NDArray[np.float64]]:
-    """Give the lines a cylinder is drawn by: its two rims, and straight lines between them.
+    """Return the lines a cylinder is drawn by: its two rims, and straight lines between them.
 
     Parameters
     ----------

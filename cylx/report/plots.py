@@ -138,7 +138,7 @@ def plot_radii(found: Extraction | Result, reference: Sequence[float] | None = N
 
 
 def _radii_of(found: Extraction | Result) -> tuple[FloatArray, list[float | None]]:
-    """Give the radii and their standard deviations, None where there are none."""
+    """Return the radii and their standard deviations, None where there are none."""
     if isinstance(found, Extraction):
         pairs = [(fit.cylinder.radius, fit.radius_sd) for fit in found.cylinders]
     else:

@@ -92,7 +92,7 @@ def pack_residuals(residuals: FloatArray, limit: float) -> NDArray[np.int8]:
 
 
 def original_colors(cloud: PointCloud) -> NDArray[np.uint8] | None:
-    """Give the colour each finite point had in its file, None if it had none.
+    """Return the colour each finite point had in its file, None if it had none.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ class Scenery:
         return cls(found.input.file, shapes, cloud.points, labels, residuals, colors, scale.spacing, scale.noise)
 
     def thinned(self, most: int) -> Scenery:
-        """Give about `most` of the points, at equal steps of their order."""
+        """Return about `most` of the points, at equal steps of their order."""
         step = max(1, len(self.points) // max(most, 1))
         if step == 1:
             return self
@@ -118,7 +118,7 @@ class Scenery:
         )
 
     def first(self, count: int) -> Scenery:
-        """Give the first cylinders and all points; those of other cylinders are of none."""
+        """Return the first cylinders and all points; those of other cylinders are of none."""
         if len(self.shapes) <= count:
             return self
         labels = np.where(self.labels < count, self.labels, -1).astype(np.int32)

@@ -81,7 +81,7 @@ class Input(Part):
         }
 
     def is_of(self, selection: Selection) -> bool:
-        """Say whether these points took part, and no others."""
+        """Return whether these points took part, and no others."""
         return all(getattr(self, name) == value for name, value in self.keys_of(selection).items())
 
     @classmethod
@@ -112,5 +112,5 @@ def plain_numbers(vector: Iterable[float]) -> list[float]:
 
 
 def text_of(content: Mapping[str, Any]) -> str:
-    """Give the text of a JSON file, with a newline at its end."""
+    """Return the text of a JSON file, with a newline at its end."""
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

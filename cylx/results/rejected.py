@@ -66,16 +66,16 @@ class Rejections(Part):
         )
 
     def to_object(self) -> dict[str, Any]:
-        """Give the JSON object; what was not computed is left out."""
+        """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
         drop_missing([content["input"], *content["rejected"]])
         return content
 
     def to_json(self) -> str:
-        """Give the text of the file, with a newline at its end."""
+        """Return the text of the file, with a newline at its end."""
         return text_of(self.to_object())
 
 
 def rejections_schema() -> dict[str, Any]:
-    """Give the JSON schema of the file."""
+    """Return the JSON schema of the file."""
     return Rejections.model_json_schema(by_alias=True)

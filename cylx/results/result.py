@@ -173,7 +173,7 @@ class ResultCylinder(Measured, Numbered):  # the keys of the last one come first
         return cls(id=index, **cls.keys_of(fit), catalogue=match)
 
     def to_object(self) -> dict[str, Any]:
-        """Give the JSON object; what was not computed is left out."""
+        """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json")
         drop_missing([content, content["catalogue"] or {}])
         return content
@@ -269,7 +269,7 @@ class Result(Part):
         return cls.parse(mapping, "the text")
 
     def to_object(self) -> dict[str, Any]:
-        """Give the JSON object; what was not computed is left out."""
+        """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
         drop_missing([content["input"], content["scene"]])
         return content | {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
@@ -284,16 +284,16 @@ class Result(Part):
         return html_in_notebook(self)
 
     def to_dataframe(self) -> Any:  # noqa: ANN401  pandas is an extra
-        """Give the cylinders as a pandas data frame, its columns those of `cylx.results.table.table_of`."""
+        """Return the cylinders as a pandas data frame, its columns those of `cylx.results.table.table_of`."""
         return dataframe_of([cylinder.to_object() for cylinder in self.cylinders])
 
     def to_json(self) -> str:
-        """Give the text of the file, with a newline at its end."""
+        """Return the text of the file, with a newline at its end."""
         return text_of(self.to_object())
 
 
 def result_schema() -> dict[str, Any]:
-    """Give the JSON schema of the result file."""
+    """Return the JSON schema of the result file."""
     return Result.model_json_schema(by_alias=True)
 
 

@@ -23,7 +23,7 @@ _ALWAYS = (
 
 
 def table_of(cylinders: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Give the columns of a table of cylinders.
+    """Return the columns of a table of cylinders.
 
     Vectors have a column for each of x, y and z, and keys of inner objects follow that of the object:
     `uncertainty_radius` is the standard deviation of the radius. Matrices are left out.
@@ -50,7 +50,7 @@ def table_of(cylinders: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
 
 
 def dataframe_of(cylinders: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401  pandas may not be there
-    """Give the same table as a pandas data frame.
+    """Return the same table as a pandas data frame.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def dataframe_of(cylinders: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
 
 
 def _cells(part: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Give the names and values of the columns of one object."""
+    """Yield the names and values of the columns of one object."""
     for key, value in part.items():
         if isinstance(value, Mapping):
             yield from _cells(value, f"{prefix}{key}_")

@@ -57,7 +57,7 @@ class Caution:
 
 
 def cautions(whole: PointCloud, cloud: PointCloud, scene: Scene, least: int) -> list[Caution]:
-    """Say what will go wrong with a cloud: all that can be seen without looking for cylinders.
+    """Return what will go wrong with a cloud: all that can be seen without looking for cylinders.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def cautions(whole: PointCloud, cloud: PointCloud, scene: Scene, least: int) -> 
 
 
 def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
-    """Say what makes the answer wrong without a sign of it: steps, copies, and noise that hides thin cylinders.
+    """Return what makes the answer wrong without a sign of it: steps, copies, and noise that hides thin cylinders.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
 
 
 def step_of(values: FloatArray) -> float:
-    """Give the step in which coordinates are stored: of single precision, of a lattice, or of uneven levels.
+    """Return the step in which coordinates are stored: of single precision, of a lattice, or of uneven levels.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def step_of(values: FloatArray) -> float:
 
 
 def _single_step(values: FloatArray) -> float:
-    """Give the step that single precision has where the values are."""
+    """Return the step that single precision has where the values are."""
     return float(np.spacing(np.float32(np.median(np.abs(values)))))
 
 

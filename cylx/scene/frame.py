@@ -60,7 +60,7 @@ def check_usable(points: FloatArray, place: str) -> None:
 
 
 def cell_cube(points: FloatArray, enough: float = 0.0) -> tuple[FloatArray, float]:
-    """Give corner and side of the cube that the cells fill: that of all points, but for a few that stray far away.
+    """Return corner and side of the cube that the cells fill: that of all points, but for a few that stray far away.
 
     A single point at zero in a scan with coordinates of millions would leave the scan one cell. Strays stay in the
     cloud, in the cells at the border.

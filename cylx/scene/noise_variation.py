@@ -104,7 +104,7 @@ def noise_by_size(
 def _noise_of_flat(
     points: FloatArray, codes: IndexArray, unit: float, size: float, sample: IndexArray, least: float
 ) -> float | None:
-    """Give the noise over the flat ones of pieces of a size; None if there are few of them, or they do not agree."""
+    """Return the noise over the flat ones of pieces of a size; None if there are few of them, or they do not agree."""
     level = min(BITS, max(0, math.floor(math.log2(size / unit))))
     cells, starts = cell_starts(codes, level)
     patches = np.empty((len(sample), PATCH, 3))

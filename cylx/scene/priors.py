@@ -31,13 +31,13 @@ def out_of_range(segment: Segment, radii: tuple[float, float], scene: SceneConfi
 
 
 def radius_range(config: Config, frame: Frame) -> tuple[float, float]:
-    """Give the least and the greatest radius looked for in frame units, from a resolved configuration."""
+    """Return the least and the greatest radius looked for in frame units, from a resolved configuration."""
     low, high = config.scene.radius_min, config.scene.radius_max
     return (low or 0.0) / frame.spacing, (high or math.inf) / frame.spacing
 
 
 def known_of(config: Config, frame: Frame) -> Prior | None:
-    """Give what is known of each cylinder in frame units, from a resolved configuration; None if nothing is."""
+    """Return what is known of each cylinder in frame units, from a resolved configuration; None if nothing is."""
     scene = config.scene
     drawn = scene.axis is not None and scene.axis_sd_deg is not None
     if scene.known_radius is None and not drawn:
@@ -51,7 +51,7 @@ def known_of(config: Config, frame: Frame) -> Prior | None:
 
 
 def catalogue_of(config: Config, frame: Frame) -> Catalogue | None:
-    """Give the nominal radii in frame units, from a resolved configuration; None without a catalogue."""
+    """Return the nominal radii in frame units, from a resolved configuration; None without a catalogue."""
     entries = config.scene.catalogue
     if entries is None:
         return None

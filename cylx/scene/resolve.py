@@ -44,7 +44,7 @@ def resolve(config: Config, scene: Scene) -> Config:
 
 
 def thinnest(scene: Scene) -> tuple[float, float]:
-    """Give the least radius that is looked for, and that from which a cylinder that stands free is found as a rule.
+    """Return the least radius that is looked for, and that from which a cylinder that stands free is found as a rule.
 
     Parameters
     ----------

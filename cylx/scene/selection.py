@@ -70,7 +70,7 @@ def select(cloud: PointCloud, selection: Selection) -> PointCloud:
 
 
 def inside_box(points: FloatArray, crop: Crop) -> MaskArray:
-    """Tell which points are in a box along the axes, its sides included.
+    """Return which points are in a box along the axes, its sides included.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def one_a_voxel(points: FloatArray, side: float) -> IndexArray:
 
 
 def _grouped(cells: FloatArray) -> tuple[IndexArray, IndexArray]:
-    """Give an order in which the points of a voxel follow each other, and a number for the voxel of each."""
+    """Return an order in which the points of a voxel follow each other, and a number for the voxel of each."""
     low = cells.min(axis=0)
     counts = cells.max(axis=0) - low + 1.0
     if counts.prod() < 2.0**62:
@@ -157,7 +157,7 @@ def _classes_of(cloud: PointCloud) -> NDArray[Any]:
 
 
 def _whole_table(cloud: PointCloud) -> NDArray[np.void]:
-    """Give the table; that of a bare cloud is made of its points."""
+    """Return the table; that of a bare cloud is made of its points."""
     if cloud.table is not None:
         return cloud.table
     table = np.empty(cloud.rows, np.dtype([(axis, "f8") for axis in "xyz"]))

@@ -21,7 +21,7 @@ CAPACITY = 4096
 
 
 def axes_of(fit: EllipseFit) -> FloatArray:
-    """Give the two possible axis directions of an ellipse (eq. 4).
+    """Return the two possible axis directions of an ellipse (eq. 4).
 
     They are the plane's normal, turned about the minor axis by plus or minus arccos(b / a), the angle of eq. 3.
 

@@ -112,7 +112,7 @@ class CandidateGame:
             self._degrees[columns] -= values
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
-        """Give the candidates still in the game that a cylinder accounts for, or that say closely the same."""
+        """Return the candidates still in the game that a cylinder accounts for, or that say closely the same."""
         limits = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
         return self._places.agreeing(segment, self._alive, *limits)
 
@@ -122,7 +122,7 @@ class CandidateGame:
         return StageReport("clustering", len(self._candidates), self._clusters, dropped)
 
     def _neighbourhood(self) -> IndexArray | None:
-        """Give the best connected candidate that is left, and those it plays with."""
+        """Return the best connected candidate that is left, and those it plays with."""
         least = 0.5 * self._config.min_payoff * (self._config.min_support - 1)
         while self._heap:
             degree, i = heapq.heappop(self._heap)

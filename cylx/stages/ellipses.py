@@ -99,7 +99,7 @@ def split_pieces(points: FloatArray, link: float) -> list[IndexArray]:
 
 @njit(cache=True, nogil=True)
 def _join(rows: IndexArray, columns: IndexArray, roots: IndexArray) -> None:
-    """Give all nodes that edges connect the least of them as their root: union and find."""
+    """Return all nodes that edges connect the least of them as their root: union and find."""
     for e in range(len(rows)):
         a, b = rows[e], columns[e]
         while roots[a] != a:

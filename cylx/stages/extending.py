@@ -64,7 +64,7 @@ def extend(finding: Finding, ground: Ground, judge: Judge) -> Finding:
 
 
 def _longer(finding: Finding, ground: Ground, judge: Judge, times: float) -> Finding | None:
-    """Give a cylinder with what lies within so many times its length, if it passes as well as before."""
+    """Return a cylinder with what lies within so many times its length, if it passes as well as before."""
     longer = _lengthened(finding, ground, times)
     judged = None if longer is None else judge(longer, finding)
     return judged if judged is not None and judged.confidence >= finding.confidence - LESS else None
@@ -107,7 +107,7 @@ def _lengthened(finding: Finding, ground: Ground, times: float) -> Segment | Non
 
 
 def _end(heights: FloatArray, on: NDArray[np.bool_], half: float, reach: float, share: float) -> float:
-    """Give the height at which the points on the surface end, `half` if there are too few beyond it.
+    """Return the height at which the points on the surface end, `half` if there are too few beyond it.
 
     Along the axis each point on the surface counts one, each beside it takes off what is to be expected on the surface,
     and so does each length without any; the end is where the sum is largest. What lies behind a wide gap is something

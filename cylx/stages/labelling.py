@@ -13,7 +13,7 @@ IndexArray = NDArray[np.int64]
 
 
 def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.int32], FloatArray]:
-    """Give each point the cylinder whose surface it is nearest to, within three deviations of it.
+    """Return each point the cylinder whose surface it is nearest to, within three deviations of it.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def label_points(segments: list[Segment], ground: Ground) -> tuple[NDArray[np.in
 
 
 def surface_points(segment: Segment, ground: Ground) -> tuple[IndexArray, FloatArray, FloatArray]:
-    """Give the points within three deviations of a segment's surface that may belong to it.
+    """Return the points within three deviations of a segment's surface that may belong to it.
 
     Parameters
     ----------

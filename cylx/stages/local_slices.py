@@ -134,7 +134,7 @@ def _look(
 
 @njit(cache=True, nogil=True)
 def _draw(state: int) -> int:
-    """Give the next state of a xorshift generator; its upper bits are as good as random."""
+    """Return the next state of a xorshift generator; its upper bits are as good as random."""
     state ^= (state << 13) & 0x7FFFFFFFFFFFFFFF
     state ^= state >> 7
     state ^= (state << 17) & 0x7FFFFFFFFFFFFFFF

@@ -68,7 +68,7 @@ def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[
 
 
 def _first_join(pool: list[Finding], i: int, ground: Ground, judge: Judge) -> tuple[int, Finding] | None:
-    """Give the first after i that can be joined with it, and what they are together."""
+    """Return the first after i that can be joined with it, and what they are together."""
     rest = pool[i + 1 :]
     if not rest:
         return None
@@ -91,12 +91,12 @@ def _first_join(pool: list[Finding], i: int, ground: Ground, judge: Judge) -> tu
 
 
 def as_rows(segments: Sequence[Segment]) -> FloatArray:
-    """Give segments as rows (n, 8): model and half height."""
+    """Return segments as rows (n, 8): model and half height."""
     return np.array([[*segment.model, segment.half] for segment in segments]).reshape(len(segments), 8)
 
 
 def is_part_of(segment: Segment, known: FloatArray) -> bool:
-    """Tell whether a segment lies on one that is known: axis within a sixth of the radius, radius within a tenth.
+    """Return whether a segment lies on one that is known: axis within a sixth of the radius, radius within a tenth.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
 
 
 def _point_at_each_other(a: Finding, b: Finding) -> bool:
-    """Tell whether the line through the middles of two pieces has the direction of both, as well as these are known."""
+    """Return whether the line through the middles of two pieces has the direction of both, within their errors."""
     across = b.segment.model[:3] - a.segment.model[:3]
     distance = float(np.linalg.norm(across))
     place = (a.offset_error**2 + b.offset_error**2) / distance**2
@@ -145,7 +145,7 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
 
 
 def _is_bridged(ground: Ground, model: FloatArray, half: float, width: float) -> bool:
-    """Tell whether points lie on a cylinder about its middle, and next to none beside its surface."""
+    """Return whether points lie on a cylinder about its middle, and next to none beside its surface."""
     reach = model[6] + max(0.5 * model[6], 4.0 * width)
     near = ground.cells.near_cylinder(model, -half, half, 0.0, reach)
     _, residuals, _ = coordinates_of(ground.points, near[ground.may_be_on(near, model[6])], model)

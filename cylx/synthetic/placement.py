@@ -48,7 +48,7 @@ class Room:
 
 
 def segment_distances(start: FloatArray, end: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
-    """Give the distance of one segment to each of n others; segments may be single points."""
+    """Return the distance of one segment to each of n others; segments may be single points."""
     own, others, between = end - start, ends - starts, start - starts
     a, e = own @ own, np.einsum("ij,ij->i", others, others)
     b, c, f = others @ own, between @ own, np.einsum("ij,ij->i", others, between)

@@ -75,7 +75,7 @@ class SyntheticScene:
     params: Mapping[str, Any]
 
     def truth(self) -> dict[str, object]:
-        """Give the truth as a JSON object: lengths in scene units, angles in degrees."""
+        """Return the truth as a JSON object: lengths in scene units, angles in degrees."""
         return {
             "family": self.family,
             "seed": self.seed,
@@ -86,7 +86,7 @@ class SyntheticScene:
         }
 
     def moved(self, scale: float = 1.0, offset: Sequence[float] = (0.0, 0.0, 0.0)) -> SyntheticScene:
-        """Give the scene in another frame: x -> scale x + offset.
+        """Return the scene in another frame: x -> scale x + offset.
 
         Parameters
         ----------

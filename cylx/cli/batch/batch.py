@@ -127,7 +127,7 @@ class Batch:
         self._sum_up()
 
     def _outcomes(self) -> Generator[tuple[int, Outcome], None, None]:
-        """Give what became of each scan, by its place in the list: first those that were done before."""
+        """Yield what became of each scan, by its place in the list: first those that were done before."""
         todo = []
         if self.many.resume:
             self._tidy()
@@ -176,7 +176,7 @@ class Batch:
         return Outcome("skipped", finished)
 
     def _show(self, job: Job, outcome: Outcome) -> None:
-        """Say what became of a scan: always if it failed, otherwise where it is not lost among many."""
+        """Return what became of a scan: always if it failed, otherwise where it is not lost among many."""
         from cylx.io import printable
 
         if outcome.trace:

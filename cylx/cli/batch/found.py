@@ -16,7 +16,7 @@ _CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "co
 
 
 def report(talk: Conversation, job: Job, extraction: Extraction) -> None:
-    """Say what was found in a scan and where it was written."""
+    """Return what was found in a scan and where it was written."""
     if talk.quiet:
         return
     fits = extraction.cylinders

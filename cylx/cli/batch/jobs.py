@@ -201,7 +201,7 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
     with contextlib.ExitStack() as stack:
 
         def staged(name: str) -> str | Path:
-            """Give the name to write an output to for now."""
+            """Return the name to write an output to for now."""
             return stack.enter_context(moved_at_the_end(name, overwrite=overwrite))
 
         result = staged(job.result)  # the first is moved last: where the result is, all is
@@ -255,14 +255,14 @@ def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str |
 
 
 def _stem(scan: str) -> str:
-    """Give the NAME in the names of the outputs of a scan."""
+    """Return the NAME in the names of the outputs of a scan."""
     from cylx.io import cloud_name
 
     return "stdin" if scan == STREAM else Path(cloud_name(scan)).stem
 
 
 def _annotated(scan: str) -> str:
-    """Give the ending of the annotated cloud: LAS and LAZ keep their format, the others become PLY."""
+    """Return the ending of the annotated cloud: LAS and LAZ keep their format, the others become PLY."""
     from cylx.io import LAS_SUFFIXES
 
     suffix = Path(scan).suffix.lower()
@@ -275,12 +275,12 @@ def _inside(output: str, scan: str, ending: str) -> str:
 
 
 def is_folder(output: str) -> bool:
-    """Tell whether an output is a folder, or is written as if it were one."""
+    """Return whether an output is a folder, or is written as if it were one."""
     return output != STREAM and (Path(output).is_dir() or is_slashed(output))
 
 
 def is_slashed(output: str) -> bool:
-    """Tell whether an output is written as a folder, which is then made."""
+    """Return whether an output is written as a folder, which is then made."""
     return output.endswith(("/", os.sep))
 
 
@@ -314,5 +314,5 @@ def _check_twins(jobs: Sequence[Job]) -> None:
 
 
 def _is_there(scan: str) -> bool:
-    """Say whether an input can be looked for; what is missing is reported by whoever reads it."""
+    """Return whether an input can be looked for; what is missing is reported by whoever reads it."""
     return scan == STREAM or (Path(scan).exists() and not Path(scan).is_dir())

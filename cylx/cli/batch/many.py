@@ -40,7 +40,7 @@ class Many(NamedTuple):
     summary: bool | None
 
     def output(self, output: str | None) -> str | None:
-        """Give what `-o` amounts to, a folder that is to be made having a slash at its end.
+        """Return what `-o` amounts to, a folder that is to be made having a slash at its end.
 
         Raises
         ------
@@ -70,7 +70,7 @@ class Many(NamedTuple):
         return [] if folder is None or not wanted else [str(Path(folder) / name) for name in (TABLE, LIST)]
 
     def processes(self, scans: Sequence[str]) -> int | None:
-        """Give the number of processes for some scans; None for this process alone."""
+        """Return the number of processes for some scans; None for this process alone."""
         if self.jobs is None or not scans:
             return None
         if self.jobs != AUTO:

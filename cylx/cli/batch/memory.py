@@ -26,7 +26,7 @@ def memory_for(points: int) -> int:
 
 
 def memory_available() -> float | None:
-    """Give the memory that programs can have without swapping, bytes; None where the system does not tell."""
+    """Return the memory that programs can have without swapping, bytes; None where the system does not tell."""
     found = re.search(r"^MemAvailable:\s*(\d+) kB", _read(MEMINFO), re.MULTILINE)
     if found is None:
         return None
@@ -34,7 +34,7 @@ def memory_available() -> float | None:
 
 
 def _left_to_container() -> float:
-    """Give what the limit of a container leaves, bytes; infinity without one. What is only cached counts as free."""
+    """Return what the limit of a container leaves, bytes; infinity without one. What is only cached counts as free."""
     limit, used = _read(CONTAINER / "memory.max").strip(), _read(CONTAINER / "memory.current").strip()
     if not (limit.isdecimal() and used.isdecimal()):
         return math.inf
@@ -50,7 +50,7 @@ def _read(path: Path) -> str:
 
 
 def memory_held(process: int) -> int:
-    """Give the resident memory of a process, bytes; 0 where the system does not tell."""
+    """Return the resident memory of a process, bytes; 0 where the system does not tell."""
     try:
         pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE")
@@ -59,7 +59,7 @@ def memory_held(process: int) -> int:
 
 
 def cores() -> int:
-    """Give the number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:  # macOS and Windows do not tell

@@ -80,7 +80,7 @@ def drawing_of(cylinders: Sequence[ResultCylinder], units: str | None, place: st
 
 
 def remarks_on(drawing: Drawing, written: dict[str, Exported]) -> list[str]:
-    """Say what the reader of some files has to know."""
+    """Return what the reader of some files has to know."""
     out = []
     if drawing.flat and any(not name.lower().endswith(".csv") for name in written):
         out.append(f"of height 0, and only in tables: cylinder {', '.join(map(str, drawing.flat))}")

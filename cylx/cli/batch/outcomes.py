@@ -79,14 +79,14 @@ def check_required(job: Job, found: int, required: int | None) -> None:
 
 
 def failed_outcome(failure: Exception, finished: Finished | None, *, debug: bool) -> Outcome:
-    """Say what became of a scan that failed, with or without its outputs."""
+    """Return what became of a scan that failed, with or without its outputs."""
     line, code = describe_failure(failure)
     trace = "".join(traceback.format_exception(failure)).rstrip() if debug else ""
     return Outcome("failed", finished, line.removeprefix("cylx: "), code, peak_memory(), trace)
 
 
 def lost_outcome(job: Job, exit_code: int | None) -> Outcome:
-    """Say what became of a scan whose process has died."""
+    """Return what became of a scan whose process has died."""
     from cylx.io import printable
 
     place = printable(job.scan)

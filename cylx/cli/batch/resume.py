@@ -20,7 +20,7 @@ _MOST_HEADER = 1 << 20
 
 
 def finished_before(job: Job, settings: Config, selection: Selection) -> Result | None:
-    """Give the result of a scan if all its outputs are there, from this version, these bytes, points and settings.
+    """Return the result of a scan if all its outputs are there, from this version, these bytes, points and settings.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
 
 
 def is_of_settings(result: Result, settings: Config) -> bool:
-    """Say whether settings amount to the configuration of a result.
+    """Return whether settings amount to the configuration of a result.
 
     What is read off the cloud follows from its spacing, its noise and its bounds, which the result has. It also says
     which of the first two were given: those must be given again, and the others left to be measured.
@@ -79,7 +79,7 @@ def is_of_settings(result: Result, settings: Config) -> bool:
 
 
 def _belong(job: Job, result: Result) -> bool:
-    """Say whether what can be told to be of another result, or another unit, is of this one."""
+    """Return whether what can be told to be of another result, or another unit, is of this one."""
     from cylx.cli.batch.meshes import mesh_of
     from cylx.io import read_json
 
@@ -113,7 +113,7 @@ def check_own(jobs: Sequence[Job]) -> None:
 
 
 def is_own_json(name: str) -> bool:
-    """Say whether a file is a JSON object with one of our schemas."""
+    """Return whether a file is a JSON object with one of our schemas."""
     from cylx.io import read_json
 
     try:
@@ -123,7 +123,7 @@ def is_own_json(name: str) -> bool:
 
 
 def _is_own(name: str, job: Job) -> bool:
-    """Say whether cylx wrote an output; of what bears no sign of it, the result beside it tells."""
+    """Return whether cylx wrote an output; of what bears no sign of it, the result beside it tells."""
     if name.endswith(".json") or name == job.result:
         return is_own_json(name)
     if name == job.annotated:

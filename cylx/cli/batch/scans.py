@@ -40,7 +40,7 @@ def find_scans(names: Sequence[str], *, recursive: bool) -> list[str]:
 
 
 def _scans_of(name: str, *, recursive: bool) -> list[str]:
-    """Give the scans that one argument means."""
+    """Return the scans that one argument means."""
     if name == STREAM:
         return [name]
     if Path(name).is_dir():
@@ -51,7 +51,7 @@ def _scans_of(name: str, *, recursive: bool) -> list[str]:
 
 
 def _scans_in(folder: str, *, recursive: bool) -> list[str]:
-    """Give the scans in a folder."""
+    """Return the scans in a folder."""
     from cylx.io import cloud_suffix, cloud_suffixes, printable
 
     suffixes = cloud_suffixes()
@@ -65,7 +65,7 @@ def _scans_in(folder: str, *, recursive: bool) -> list[str]:
 
 
 def _scans_like(pattern: str) -> list[str]:
-    """Give the files that a pattern fits; its suffix says what is read, and if it has none, the suffixes of clouds."""
+    """Return the files that match a pattern: those of its suffix, or of any suffix of clouds if it has none."""
     from cylx.io import cloud_suffix, cloud_suffixes, printable
 
     suffix = Path(pattern).suffix
@@ -80,7 +80,7 @@ def _scans_like(pattern: str) -> list[str]:
 
 
 def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
-    """Give the files in a folder by name, then those of its folders; hidden ones and links to folders are left out."""
+    """Yield the files in a folder by name, then those of its folders; hidden ones and links to folders are left out."""
 
     def refuse(error: OSError) -> NoReturn:
         from cylx.io import printable
@@ -97,6 +97,6 @@ def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
 
 
 def _is_foreign(path: str) -> bool:
-    """Say whether cylx has not written a file that could be taken for a scan."""
+    """Return whether cylx has not written a file that could be taken for a scan."""
     name = Path(path).name
     return Path(name).stem[-len(ANNOTATED) :] != ANNOTATED and not (name == TABLE and is_own_table(path))

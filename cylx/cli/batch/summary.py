@@ -53,12 +53,12 @@ def list_text(files: Sequence[Mapping[str, object]]) -> str:
 
 
 def legible(name: str) -> str:
-    r"""Give the name of a file in characters that UTF-8 has; a byte that is none becomes `\xff`."""
+    r"""Return the name of a file in characters that UTF-8 has; a byte that is none becomes `\xff`."""
     return os.fsencode(name).decode("utf-8", "backslashreplace")
 
 
 def is_own_table(path: str) -> bool:
-    """Say whether a file begins as the table does."""
+    """Return whether a file begins as the table does."""
     start = ",".join(COLUMNS[:4]).encode()
     try:
         with Path(path).open("rb") as file:

@@ -90,7 +90,7 @@ class Workers(Generic[Task, Answer]):
             self._end()
 
     def _fits(self, index: int, needs: Sequence[int]) -> bool:
-        """Say whether there is memory for another task beside those that are worked on; the first has no choice."""
+        """Return whether there is memory for another task beside those that are worked on; the first has no choice."""
         available = memory_available() if self._busy else None
         if available is None:
             return True

@@ -41,7 +41,7 @@ class Conversation:
 
     @contextmanager
     def progress(self) -> Iterator[Observer]:
-        """Give an observer that shows how far the stages are, where somebody can see it."""
+        """Yield an observer that shows how far the stages are, where somebody can see it."""
         if self.quiet or not sys.stderr.isatty():
             yield SilentObserver()
             return
@@ -53,7 +53,7 @@ class Conversation:
 
     @contextmanager
     def counting(self, total: int) -> Iterator[Callable[[], None]]:
-        """Give what is called after each of many scans; a bar and the time that is left, where somebody can see it."""
+        """Yield what is called after each of many scans; a bar and the time that is left, where somebody can see it."""
         if self.quiet or not sys.stderr.isatty():
             yield lambda: None
             return

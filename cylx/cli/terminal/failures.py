@@ -55,7 +55,7 @@ class Failures:
 
 
 def describe_failure(failure: BaseException) -> tuple[str, int]:
-    """Give the line and the exit code of a failure.
+    """Return the line and the exit code of a failure.
 
     Parameters
     ----------
@@ -142,13 +142,13 @@ def flush_answer() -> BrokenPipeError | OutputError | None:
 
 
 def _raised_by_click(trace: TracebackType | None) -> bool:
-    """Say whether it was click that failed to write, its help or version, which goes to standard output."""
+    """Return whether it was click that failed to write, its help or version, which goes to standard output."""
     frames = [frame for frame, _ in traceback.walk_tb(trace)]
     return bool(frames) and frames[-1].f_globals.get("__name__") == "click.utils"
 
 
 def _unwritten(error: OSError) -> OutputError:
-    """Say why standard output could not be written."""
+    """Return why standard output could not be written."""
     return OutputError("standard output", f"cannot be written: {error.strerror}", "free some space, or write to a file")
 
 

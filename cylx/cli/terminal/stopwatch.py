@@ -32,7 +32,7 @@ class Stopwatch:
         self.stages[name] = self.stages.get(name, 0.0) + seconds
 
     def report(self, points: int, cylinders: int) -> dict[str, object]:
-        """Give the times of the scan as a JSON object; `seconds` is from the start until now."""
+        """Return the times of the scan as a JSON object; `seconds` is from the start until now."""
         return {
             "file": self.scan,
             "points": points,
@@ -43,7 +43,7 @@ class Stopwatch:
 
 
 def peak_memory() -> int | None:
-    """Give the largest resident memory of this process so far, bytes; None where the system does not tell."""
+    """Return the largest resident memory of this process so far, bytes; None where the system does not tell."""
     try:
         import resource
     except ModuleNotFoundError:
