@@ -101,7 +101,7 @@ def test_errors_of_no_match_are_not_small(run_cylx, files, tmp_path):
     [
         ("", ": is empty"),
         ("{", ":1:2: not JSON"),
-        ("[]", ": holds no JSON object"),
+        ("[]", ": is not a JSON object"),
         ('{"cylinders": 3}', ": has no list 'cylinders'"),
         ('{"cylinders": [{"axis_point": [0, 0, 0]}]}', ": cylinders[0].axis_direction: is missing"),
     ],

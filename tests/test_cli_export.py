@@ -110,7 +110,7 @@ def test_a_missing_extra_is_named_before_anything_is_written(run_cylx, tmp_path,
     ("text", "said"),
     [
         ("{}", "cylx_version: is missing"),
-        ("[1]", "holds no JSON object"),
+        ("[1]", "is not a JSON object"),
         ("hello", "not JSON"),
         ('{"schema": "cylx.rejected/1"}', "schema"),
     ],

@@ -265,7 +265,7 @@ class Result(Part):
             fault = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise InputError("the text", f"not JSON: {fault}", remedy) from None
         if not isinstance(mapping, dict):
-            raise InputError("the text", "holds no JSON object", remedy)
+            raise InputError("the text", "is not a JSON object", remedy)
         return cls.parse(mapping, "the text")
 
     def to_object(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Pieces -> cylinders: one pipe is one cylinder, however many clusters and gaps it came in."""
+"""Pieces -> cylinders: join the pieces of one pipe, whatever clusters and gaps they came from."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ COSINE = math.cos(math.radians(8.0))
 SAME_COSINE = math.cos(math.radians(4.0))
 RADIUS_RATIO = 0.75
 OFFSET = 0.3
-"""Axes further apart than this, in radii, and four standard deviations are those of two pipes."""
+"""Axes further apart than this, in radii, and than four standard deviations belong to two pipes."""
 LOST = 1.0
-"""If the error is more than this many radii, a piece no longer says where its pipe goes on: that may be another, unless
-there are points between the two."""
+"""If the predicted axis error exceeds this many radii, the continuation of a piece may be another pipe, unless there are
+points between the two."""
 FARTHEST = 4.0
-"""If it is more than this many, not even then."""
+"""If the error exceeds this many radii, two pieces are never joined."""
 BETWEEN = 12
-"""Fewest points on the surface between two pieces that tell of a pipe there, so sparse that no cluster was found."""
+"""Minimum number of points on the surface between two pieces to show a pipe there, too sparse for a cluster."""
 DENSER = 4.0
-"""How much denser points must lie on that surface than about it."""
+"""Minimum ratio of the density of points on that surface to that around it."""
 IN_LINE = 9.5
 """Chi-square of four angles, which one in twenty true pairs exceeds."""
 ENOUGH = 10000
-"""Points of each piece that suffice to see whether one cylinder explains both."""
+"""Points of each piece used to test whether one cylinder explains both."""
 CLAIMED = 0.5
-"""A cylinder that has more than this share of its points in common with better ones is one of them."""
+"""A cylinder that shares more than this share of its points with better ones is a duplicate."""
 
 Judge = Callable[[Segment, Finding], Finding | None]
 
 
 def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[Finding]:
-    """Join pairs that one cylinder explains as well as two, until none is left.
+    """Join pairs of cylinders that one cylinder explains as well as two, until no such pair is left.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[
     ground : Ground
         The cloud.
     judge : callable
-        Refits and verifies a joined segment, in the light of the better of its parts; None if it does not pass.
+        Refits and verifies a joined segment, given the better of its parts; None if it is rejected.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def merge_pieces(findings: list[Finding], ground: Ground, judge: Judge) -> list[
 
 
 def _first_join(pool: list[Finding], i: int, ground: Ground, judge: Judge) -> tuple[int, Finding] | None:
-    """Return the first after i that can be joined with it, and what they are together."""
+    """Return the first finding after i that can be joined with i, and the joined finding."""
     rest = pool[i + 1 :]
     if not rest:
         return None
@@ -96,7 +96,7 @@ def as_rows(segments: Sequence[Segment]) -> FloatArray:
 
 
 def is_part_of(segment: Segment, known: FloatArray) -> bool:
-    """Return whether a segment lies on one that is known: axis within a sixth of the radius, radius within a tenth.
+    """Return whether a segment lies on a known one: axis within a sixth of the radius, radius within a tenth.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def is_part_of(segment: Segment, known: FloatArray) -> bool:
 
 
 def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
-    """Drop the cylinders most of whose points better ones have claimed.
+    """Drop the cylinders most of whose points belong to better ones.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
 
 
 def _is_bridged(ground: Ground, model: FloatArray, half: float, width: float) -> bool:
-    """Return whether points lie on a cylinder about its middle, and next to none beside its surface."""
+    """Return whether points lie on a cylinder about its middle, and almost none beside its surface."""
     reach = model[6] + max(0.5 * model[6], 4.0 * width)
     near = ground.cells.near_cylinder(model, -half, half, 0.0, reach)
     _, residuals, _ = coordinates_of(ground.points, near[ground.may_be_on(near, model[6])], model)
@@ -156,7 +156,7 @@ def _is_bridged(ground: Ground, model: FloatArray, half: float, width: float) ->
 
 
 def _join(a: Finding, b: Finding, error: float, ground: Ground, judge: Judge) -> Finding | None:
-    """Fit one cylinder to two pieces alike and in line within an error; None if it does not explain both."""
+    """Fit one cylinder to two similar pieces in line within an error; return None if it does not explain both."""
     one, two = a.segment, b.segment
     across = two.model[:3] - one.model[:3]
     height = float(across @ one.model[3:6])
