@@ -113,7 +113,7 @@ class CandidateGame:
             self._degrees[columns] -= values
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
-        """Return the remaining candidates that a cylinder explains, or with `closely` only those that nearly equal it."""
+        """Return the remaining candidates that a cylinder explains, or with `closely` those that nearly equal it."""
         limits = (0.1, 4.0, 0.06) if closely else (0.25, 10.0, 0.2)
         return self._places.agreeing(segment, self._alive, *limits)
 

@@ -98,7 +98,7 @@ def _lengthened(finding: Finding, ground: Ground, times: float) -> Segment | Non
         return None
     heights, residuals, _ = coordinates_of(ground.points, near, longer)
     on = np.abs(residuals) < 2.0 * noise
-    share = longer[6] * 8.0 * noise / (outer**2 - 8.0 * longer[6] * noise)  # ratio of the areas on and beside the surface
+    share = longer[6] * 8.0 * noise / (outer**2 - 8.0 * longer[6] * noise)  # of the areas on and beside the surface
     low, high = -_end(-heights, on, half, reach, share), _end(heights, on, half, reach, share)
     if low > -half - longer[6] and high < half + longer[6]:
         return None

@@ -198,7 +198,7 @@ def _slice_windows(
                 fits = fits or fit == 2
                 if fit == 2 and quality[0] > rows[s, 7]:
                     move_to_foot(model, seed)
-                    for d in range(7):  # a slice assignment takes seconds to compile, because of its error message about shapes
+                    for d in range(7):  # a slice assignment takes seconds to compile, for its error message on shapes
                         rows[s, d] = model[d]
                     rows[s, 7], rows[s, 8] = quality[0], quality[1]
             counts[3] += 0 if fits else 1

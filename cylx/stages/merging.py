@@ -20,8 +20,8 @@ RADIUS_RATIO = 0.75
 OFFSET = 0.3
 """Axes further apart than this, in radii, and than four standard deviations belong to two pipes."""
 LOST = 1.0
-"""If the predicted axis error exceeds this many radii, the continuation of a piece may be another pipe, unless there are
-points between the two."""
+"""If the predicted axis error exceeds this many radii, the continuation of a piece may be another pipe, unless there
+are points between the two."""
 FARTHEST = 4.0
 """If the error exceeds this many radii, two pieces are never joined."""
 BETWEEN = 12
