@@ -63,7 +63,7 @@ PLY = {
     ply("element vertex 1\nproperty float x\n"): "scan: the vertex element has no property y, z; "
     "give a PLY with x, y and z",
     ply(f"element vertex 1\n{XYZ}".replace("float y", "list uchar float y")): "scan: the property y is a list; "
-    "give a PLY with one x, y and z a point",
+    "give a PLY with one x, y and z per point",
     ply(
         f"element vertex 1\n{XYZ}property int x\n"
     ): f"scan: the vertex element has the property 'x' twice; {PLY_AGAIN}",
@@ -109,8 +109,8 @@ PCD = {
     pcd(SIZE="4 4 -4"): f"scan: SIZE is '4 4 -4', not made of counts; {PCD_AGAIN}",
     pcd(TYPE="F F Q"): f"scan: field 'z' has the unknown type 'Q' of size 4; {PCD_AGAIN}",
     pcd(SIZE="4 4 2"): f"scan: field 'z' has the unknown type 'F' of size 2; {PCD_AGAIN}",
-    pcd(COUNT="1 1 2"): "scan: field z has 2 values; give a PCD with one x, y and z a point",
-    pcd(COUNT=f"1 1 {10**12}"): f"scan: expected at most 4096 values a point, found 1000000000002; {PCD_AGAIN}",
+    pcd(COUNT="1 1 2"): "scan: field z has 2 values; give a PCD with one x, y and z per point",
+    pcd(COUNT=f"1 1 {10**12}"): f"scan: expected at most 4096 values per point, found 1000000000002; {PCD_AGAIN}",
     pcd(WIDTH="3"): f"scan: WIDTH x HEIGHT is 3, but POINTS is 2; {PCD_AGAIN}",
     pcd(POINTS=""): f"scan: the PCD header does not say how many POINTS there are; {PCD_AGAIN}",
     pcd(POINTS=None, HEIGHT=None): f"scan: the PCD header does not say how many POINTS there are; {PCD_AGAIN}",
@@ -163,7 +163,7 @@ TEXT = {
     b"nan nan nan\n": NO_FINITE,
 }
 OTHER = {
-    b"\0\1\2\3": "scan: is of no format that cylx reads, and no text; convert it to PLY",
+    b"\0\1\2\3": "scan: is neither text nor of a format that cylx reads; convert it to PLY",
     b"LASF\0\0": "scan: the file ends within the LAS header; get a complete copy of the file",
     b"#!/bin/sh\necho\nexit 0\n": f"scan:3: x is 'exit', not a number; {NUMBERS}",
 }

@@ -1,15 +1,15 @@
 """Jin and Lee: spheres that roll within a pipe, and a line through their centres.
 
 After Y.-H. Jin and W.-H. Lee, "Fast cylinder shape matching using random sample consensus in large scale point
-cloud", Applied Sciences 9 (2019), and what the paper says of it: no normals; spheres fitted in small neighbourhoods of
-points by RANSAC; axis and radius from all spheres. Of a straight pipe the centres lie on the axis, which principal
-components tell from a bend.
+cloud", Applied Sciences 9 (2019), and the paper's description of it: no normals; spheres fitted in small neighbourhoods
+of points by RANSAC; axis and radius from all spheres. The centres of a straight pipe lie on the axis, which principal
+components distinguish from a bend.
 
-Our readings: a neighbourhood is a ball, and without a radius given, balls of many sizes are tried, for the sphere has
-to be as large as the pipe; a sphere is the one through four points with the most points near its surface (a
-least-squares sphere of a small patch has twice the pipe's radius); lines are found by RANSAC over the centres, one
-after the other, and fitted by principal components; the radius is the median of their spheres'. The lengths and bends
-of pipes, which the original goes on to, are left out, as in the paper.
+Our readings: a neighbourhood is a ball; if no radius is given, balls of many sizes are tried, as the sphere has to be
+as large as the pipe. A sphere is the one through four points with the most points near its surface (a least-squares
+sphere of a small patch has twice the pipe's radius). Lines are found by RANSAC over the centres, one after the other,
+and fitted by principal components. The radius is the median of those of the spheres. The lengths and bends of pipes,
+which the original also finds, are left out, as in the paper.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ MaskArray = NDArray[np.bool_]
 SMALLEST, LARGEST = 6.0, 0.25
 """Radii of neighbourhoods: in spacings, and as a share of the extent."""
 MOST = 2000
-"""Points of a neighbourhood that suffice."""
+"""Maximum number of points used in a neighbourhood."""
 LEAST = 8
 NEAR = 1.5
-"""Centres within so many radii of a sphere's centre tell whether the pipe is straight there."""
+"""Centres within this many radii of a sphere's centre show whether the pipe is straight there."""
 
 
 def find_by_spheres(
@@ -82,7 +82,7 @@ def find_by_spheres(
 
 
 def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, seed: int, threads: int) -> FloatArray:
-    """Look for a sphere about each of many points; give centre and radius of those found, shape (n, 4)."""
+    """Search for a sphere about each of many points; return centre and radius of those found, shape (n, 4)."""
     rng = np.random.default_rng([seed, 12])
     extent = float(np.linalg.norm(np.ptp(frame.points, axis=0)))
     lowest, highest = min(SMALLEST, LARGEST * extent), LARGEST * extent
@@ -115,7 +115,7 @@ def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, s
 def _search_sphere(
     points: FloatArray, samples: IndexArray, distance: float, least: float, greatest: float, best: FloatArray
 ) -> int:
-    """Fill `best` with centre and radius of the sphere through four points that has the most support; count it."""
+    """Fill `best` with centre and radius of the sphere through four points with most support; return the support."""
     record = 0
     for k in range(len(samples)):
         a = samples[k, 0]
@@ -167,7 +167,7 @@ def _straight(spheres: FloatArray, linearity: float) -> MaskArray:
 
 
 def _best_line(spheres: FloatArray, pairs: IndexArray, distance: float, limits: Limits) -> MaskArray:
-    """Return the spheres that the best supported line through two centres goes through."""
+    """Return the spheres on the best supported line through two centres."""
     best = np.zeros(len(spheres), np.bool_)
     for i, j in pairs:
         line = spheres[j, :3] - spheres[i, :3]

@@ -1,4 +1,4 @@
-"""How far a cloud reaches, in one pass over its points: NumPy takes several times as long along rows of three."""
+"""The size of a cloud, in one pass over its points; NumPy takes several times as long along rows of three."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _fill_box(points: FloatArray, box: FloatArray) -> None:
 
 @njit(cache=True, nogil=True)
 def widest_deviation(points: FloatArray, low: FloatArray) -> float:
-    """Return the mean absolute deviation from the mean, of the coordinate where it is greatest."""
+    """Return the mean absolute deviation from the mean, for the coordinate with the largest one."""
     widest = 0.0
     for d in range(3):
         mean, total = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The circle through points of a plane, found robustly."""
+"""The circle through points of a plane, with robust search."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ def search_circle(
     least, greatest : float
         Radii.
     shape : ndarray of shape (5,)
-        Centre, radius twice, and 0: as the shape of an ellipse.
+        Centre, the radius twice, and 0, as in the shape of an ellipse.
 
     Returns
     -------
     float
-        The support: a sum over the points near it of one minus the squared distance over the squared tolerance.
+        The support: the sum over the points near it of one minus the squared distance over the squared tolerance.
     """
     record = 0.0
     for k in range(len(samples)):

@@ -24,7 +24,7 @@ class Cylinder:
     point : ndarray of shape (3,)
         Middle of the axis segment, scene units.
     direction : ndarray of shape (3,)
-        Direction of the axis; normalised, and its largest component made positive.
+        Direction of the axis; normalised, with its largest component made positive.
     radius : float
         Scene units, > 0.
     height : float
@@ -69,7 +69,7 @@ class Cylinder:
         return self.point + 0.5 * self.height * self.direction
 
     def moved(self, origin: ArrayLike, scale: float = 1.0) -> Cylinder:
-        """Return the cylinder where x -> scale x + origin takes its points."""
+        """Return the cylinder transformed by x -> scale x + origin."""
         return Cylinder(
             scale * self.point + np.asarray(origin), self.direction, scale * self.radius, scale * self.height
         )
@@ -188,7 +188,7 @@ def coordinates_of(
 def fill_coordinates(
     points: FloatArray, model: FloatArray, width: float, heights: FloatArray, residuals: FloatArray, angles: FloatArray
 ) -> int:
-    """Fill in height, signed distance to the surface, and angle of the points within `width` of it; count them."""
+    """Fill in height, signed distance and angle of the points within `width` of the surface; return their number."""
     frame = np.empty((2, 3))
     fill_frame(model[3:6], frame)
     n = 0

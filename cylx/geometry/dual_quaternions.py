@@ -1,7 +1,7 @@
 """Unit dual quaternions: rigid motions as screws, their logarithm, their average (appendix A).
 
-A dual quaternion is an array of shape (..., 8): the real quaternion (w, x, y, z), then the dual one. A motion is the
-real part q0 with the dual part t q0 / 2, t being the pure quaternion of the translation.
+A dual quaternion is an array of shape (..., 8): the real quaternion (w, x, y, z), then the dual one. A motion has the
+real part q0 and the dual part t q0 / 2, where t is the pure quaternion of the translation.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ def _product(p: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
-    """Multiply dual quaternions of shape (..., 8): first the motion q, then p."""
+    """Multiply dual quaternions of shape (..., 8): the motion q first, then p."""
     real = _product(p[..., :4], q[..., :4])
     return np.concatenate([real, _product(p[..., :4], q[..., 4:]) + _product(p[..., 4:], q[..., :4])], axis=-1)
 
@@ -41,10 +41,10 @@ def normalised(q: FloatArray) -> FloatArray:
 
 
 def screw(axis: FloatArray, foot: FloatArray, angle: FloatArray, shift: FloatArray) -> FloatArray:
-    """Return the motion that turns by `angle` about the line (foot, axis) and moves by `shift` along it (A.2).
+    """Return the motion that rotates by `angle` about the line (foot, axis) and moves by `shift` along it (A.2).
 
-    The text of (A.2) has the dual angle 2 beta + 2 eps |T|, whose half in the cosine would apply the motion twice; the
-    dual angle meant is beta + eps |T|.
+    (A.2) as printed has the dual angle 2 beta + 2 eps |T|, whose half in the cosine would apply the motion twice; beta
+    + eps |T| is meant.
 
     Parameters
     ----------
@@ -85,8 +85,8 @@ def logarithm(q: FloatArray) -> FloatArray:
     small = sine < 1e-12
     safe = np.where(small, 1.0, sine)
     factor = np.where(small, 1.0, half / safe)
-    # d = slide along the axis; from the scalar dual part -d sin(half), and from the part of the dual vector along the
-    # axis
+    # d = slide along the axis; from the scalar dual part -d sin(half), and from the component of the dual
+    # vector along the axis
     axis = q[..., 1:4] / safe
     slide = np.where(small, 0.0, -q[..., 4:5] / safe)
     moment = (q[..., 5:8] - slide * q[..., :1] * axis) / safe
@@ -117,7 +117,7 @@ def line_screws(
     point, direction : ndarray of shape (3,) or (..., 3)
         The line to move.
     points, directions : ndarray of shape (..., 3)
-        Where to.
+        The target lines.
 
     Returns
     -------
@@ -130,10 +130,10 @@ def line_screws(
     feet, others, angle, axis = common_perpendicular(point, direction, points, directions)
     gap = others - feet
     length = np.linalg.norm(gap, axis=-1)
-    # parallel lines have an arbitrary axis: the motion is the translation itself
+    # the axis of parallel lines is arbitrary: the motion is the translation itself
     aside = (angle == 0.0) & (length > 0.0)
     axis = np.where(aside[..., None], gap / np.where(aside, length, 1.0)[..., None], axis)
-    # of lines that are nearly parallel the feet are uncertain, but not the distance along the common perpendicular
+    # for nearly parallel lines the feet are uncertain, but not the distance along the common perpendicular
     shift = np.where(aside, length, ((points - point) * axis).sum(-1))
     return screw(axis, feet, angle, shift), angle, np.abs(shift)
 
@@ -157,7 +157,7 @@ def pairwise_screw_distances(points: FloatArray, directions: FloatArray) -> tupl
     for i in range(count):
         motions, _, gaps[i] = line_screws(points[i], directions[i], points, directions)
         distances[i] = np.linalg.norm(logarithm(motions), axis=-1)
-    # the two ways round differ by rounding only
+    # the two directions of a pair differ by rounding only
     return 0.5 * (distances + distances.T), 0.5 * (gaps + gaps.T)
 
 
@@ -172,7 +172,7 @@ def blend(motions: FloatArray, weights: FloatArray, max_iterations: int = 20, to
         Non-negative, of sum 1.
     max_iterations : int
     tolerance : float
-        Ends when the step is shorter.
+        The iteration ends when a step is shorter.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The ellipse: its direct least-squares fit, its robust fit, its distances."""
+"""The ellipse: direct least-squares fit, robust fit, and distances."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ IndexArray = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Degenerate:
-    """Why some points admit no answer: a value, because it happens a thousand times a run."""
+    """The reason why points admit no solution; a return value, as it occurs thousands of times per run."""
 
     reason: str
 
@@ -68,7 +68,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
     """Fit an ellipse to points by direct least squares.
 
     Minimises the algebraic distance under 4 a c - b^2 = 1, in the numerically stable form, after centring and scaling.
-    Points of a hyperbola get an ellipse, too, which is far from them.
+    Points on a hyperbola also give an ellipse, far away from them.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
     middle = points.mean(axis=0)
     offsets = points - middle
     scale = float(np.sqrt((offsets**2).sum(axis=1).mean()))
-    if not (np.ptp(points, axis=0).any() and scale > 0):  # the mean of equal points is off by rounding
+    if not (np.ptp(points, axis=0).any() and scale > 0):  # the mean of equal points has rounding errors
         return Degenerate("all points are equal")
     x, y = (offsets / scale).T
     quadratic = np.column_stack([x * x, x * y, y * y])
@@ -114,7 +114,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
 
 
 def _from_conic(conic: FloatArray) -> tuple[FloatArray, float, float, float] | None:
-    """Return centre, semi-axes and angle of a conic, None if it is no real ellipse."""
+    """Return centre, semi-axes and angle of a conic; None if it is not a real ellipse."""
     shape = np.empty(5)
     if not conic_shape(np.asarray(conic, dtype=np.float64), shape):
         return None
@@ -175,7 +175,7 @@ def search_ellipse(
     ----------
     points : ndarray of shape (n, 2)
     samples : ndarray of shape (k, 5)
-        Indices of points; samples with repeated points are passed over.
+        Indices of points; samples with repeated points are skipped.
     tolerance : float
         Distance within which a point supports an ellipse.
     semi_minor : tuple of float
@@ -183,7 +183,7 @@ def search_ellipse(
     max_aspect : float
         Greatest semi_major / semi_minor.
     refits : int
-        Direct fits to the support, at most.
+        Maximum number of direct fits to the support.
 
     Returns
     -------
@@ -227,7 +227,7 @@ def search_conic(
     max_aspect: float,
     best: FloatArray,
 ) -> float:
-    """Fill `best` (6,) with the conic through five of xy[:, :n] that has the most support; give that support."""
+    """Fill `best` (6,) with the conic through five of xy[:, :n] that has the most support; return that support."""
     matrix, right = np.empty((5, 5)), np.empty(5)
     record = 0.0
     for k in range(len(samples)):
@@ -261,7 +261,7 @@ def search_conic(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
 def _support(xy: FloatArray, n: int, conic: FloatArray, tolerance: float) -> float:
-    """Add up one minus the squared distance from a conic over the squared tolerance, to first order."""
+    """Return the sum of one minus the squared distance from a conic over the squared tolerance, to first order."""
     a, b, c, d, e = conic[0], conic[1], conic[2], conic[3], conic[4]
     score = 0.0
     for i in range(n):

@@ -1,4 +1,4 @@
-"""Libraries that are installed only by those who need them."""
+"""Libraries for input formats that only some users need."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _NEEDS = {"las": ("las", ("laspy",)), "laz": ("las", ("laspy", "lazrs")), "e57":
 
 
 def require_extra(kind: str, place: str) -> None:
-    """Refuse an input whose format needs libraries that are not there.
+    """Refuse an input whose format needs libraries that are not installed.
 
     Parameters
     ----------
