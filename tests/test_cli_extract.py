@@ -141,8 +141,8 @@ def test_an_existing_folder_takes_the_outputs(run_cylx, scan, tmp_path):
         (
             ["a.ply", "./a.pcd"],
             {},
-            "a.cylinders.json: would be the result of a.ply and of ./a.pcd; rename one of them, or take each by itself"
-            " into a folder of its own",
+            "a.cylinders.json: would be the result of a.ply and of ./a.pcd; rename one of them, or run each by itself"
+            " into its own folder",
         ),
         (["a.ply"], {"output": "a.ply"}, "a.ply: is an input as well as an output; choose another name"),
         (["a.ply"], {"annotated": "./a.ply"}, "./a.ply: is an input as well as an output; choose another name"),

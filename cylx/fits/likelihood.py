@@ -1,4 +1,4 @@
-"""Maximum-likelihood fit of a cylinder to points of which a share are outliers with larger scatter.
+"""Maximum-likelihood fit of a cylinder to points with outliers, which have a larger scatter.
 
 The residuals are modelled by a mixture of two Gaussians (`cylx.fits.residual_law`), whose shares and widths are
 estimated together with the cylinder. Gauss-Newton steps solve the normal equations, with weights of the points from

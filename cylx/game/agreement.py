@@ -65,7 +65,7 @@ class Neighbourhood:
     def agreeing(
         self, segment: Segment, alive: NDArray[np.bool_], offset: float, angle_deg: float, radius: float
     ) -> IndexArray:
-        """Return the remaining candidates that agree with a cylinder along its height plus a radius; offset in radii."""
+        """Return the remaining candidates that agree with a cylinder, up to a radius beyond its ends."""
         reach = segment.half + float(segment.model[6])
         part = self._beside(segment, reach)
         found = np.empty(part.stop - part.start, np.int64)

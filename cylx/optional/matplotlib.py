@@ -35,7 +35,7 @@ def new_figure(inches: tuple[float, float], dpi: int, *, layout: Literal["constr
     dpi : int
         Pixels per inch.
     layout : {'constrained'}, optional
-        Layout engine of the parts; by default they are placed by hand.
+        Layout engine; by default the parts of the figure set their own positions.
 
     Raises
     ------

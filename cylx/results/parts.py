@@ -45,7 +45,7 @@ class Crop(Part):
 
 
 class Input(Part):
-    """The input cloud."""
+    """The input cloud, and the selection of its points."""
 
     file: str
     """Name of the file without its folder; `-` for standard input, `<array>` for an array."""

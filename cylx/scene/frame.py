@@ -69,7 +69,7 @@ def cell_cube(points: FloatArray, enough: float = 0.0) -> tuple[FloatArray, floa
     ----------
     points : ndarray of shape (N, 3)
     enough : float
-        A cube of this side is fine enough, so strays do not matter.
+        Up to this side the bounding cube is used as it is, as its cells are fine enough.
     """
     low, high = box_of(points)
     side = float((high - low).max())
