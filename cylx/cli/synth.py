@@ -94,7 +94,7 @@ def single(
 @click.argument("out", shell_complete=complete_files)
 @click.option("--points", type=int, default=100000, show_default=True, help="Number of points.")
 @click.option("--cylinders", type=int, default=5, show_default=True, help="Number of cylinders.")
-@click.option("--planes", type=int, default=1, show_default=True, help="Planes: floor, four walls, ceiling; 0 to 6 of them.")
+@click.option("--planes", type=int, default=1, show_default=True, help="Number of floor, walls, ceiling: 0 to 6.")
 @click.option("--boxes", type=int, default=2, show_default=True, help="Number of boxes.")
 @click.option("--spheres", type=int, default=2, show_default=True, help="Number of spheres.")
 @click.option("--cones", type=int, default=1, show_default=True, help="Number of cones.")
