@@ -1,6 +1,6 @@
 """cylx finds every cylinder in a point cloud that has no normals.
 
-The public names are resolved when they are first used, so that `import cylx` and `cylx --help` cost next to nothing.
+The public names are imported on first use, so that `import cylx` and `cylx --help` are fast.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""`python -m cylx`, and what the command `cylx` calls."""
+"""`python -m cylx`, and the entry point of the command `cylx`."""
 
 from cylx.cli import main
 from cylx.cli.terminal.startup import own_process
 
 
 def run() -> None:
-    """Run the command line in a process of its own."""
+    """Run the command line in its own process."""
     with own_process():
         main(prog_name="cylx")
 

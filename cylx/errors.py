@@ -1,23 +1,23 @@
-"""Every error a user can meet, with its exit code.
+"""All errors that a user can meet, with their exit codes.
 
-Each error names the place, the fault and the remedy in one line. Whatever is not a `CylxError` is a bug of ours and
-keeps its traceback.
+Each error names the place, the fault and the remedy in one line. Any exception other than `CylxError` is a bug of ours
+and keeps its traceback.
 """
 
 from typing import ClassVar
 
 
 class CylxError(Exception):
-    """A failure the user can mend.
+    """A failure that the user can correct.
 
     Parameters
     ----------
     place : str
-        Where it is: a file, a file and line, a configuration key, an option.
+        Where the fault is: a file, a file and line, a configuration key, an option.
     fault : str
-        What is wrong there.
+        What is wrong.
     remedy : str
-        What to do about it.
+        How to correct it.
     """
 
     exit_code: ClassVar[int] = 1
@@ -33,7 +33,7 @@ class CylxError(Exception):
 
 
 class UsageError(CylxError):
-    """An option or argument that cannot be meant."""
+    """An invalid option or argument."""
 
     exit_code = 2
 
@@ -41,21 +41,21 @@ class UsageError(CylxError):
 class ConfigError(UsageError):
     """A configuration that has an unknown key, a wrong type or an impossible value.
 
-    `faults` are all that are known, each a dotted path, what is wrong there, and what to do about it; the error itself
-    tells of the first.
+    `faults` are all known faults, each a dotted path, what is wrong, and how to correct it; the message of the error is
+    about the first.
     """
 
     faults: tuple[tuple[str, str, str], ...] = ()
 
 
 class InputError(CylxError):
-    """An input that cannot be read, or holds nothing that could be worked on."""
+    """An input that cannot be read or is unusable."""
 
     exit_code = 3
 
 
 class OutputError(CylxError):
-    """An output that could not, or must not, be written."""
+    """An output that cannot or must not be written."""
 
     exit_code = 4
 

@@ -1,4 +1,4 @@
-"""Where the modules of earlier versions have gone: their old names lead there for a release, with a warning."""
+"""Old module names of earlier versions: they lead to the new modules for one release, with a warning."""
 
 from __future__ import annotations
 
@@ -25,23 +25,23 @@ MOVED = {
     "cylx.selection": "cylx.scene.selection",
     "cylx.tables": "cylx.results.table",
 }
-"""Old and new names of what the pages of an earlier version named, or led to."""
+"""Old and new names of the modules that the pages of an earlier version named or linked to."""
 
 
 class _OldNames:
-    """What the import system asks for a module when nobody else has it."""
+    """A finder that the import system asks for a module when all others have failed."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Take over the names that have moved."""
+        """Handle the names that have moved."""
         return ModuleSpec(name, self) if name in MOVED else None  # type: ignore[arg-type]  # it is loader enough
 
     def create_module(self, spec: ModuleSpec) -> None:
-        """Leave that to the import system."""
+        """Leave the creation to the import system."""
 
     def exec_module(self, module: ModuleType) -> None:
-        """Let every name of the module be that of the new one."""
+        """Forward every name of the module to the new one."""
         new = MOVED[module.__name__]
         fault = f"{module.__name__} is {new} now; the old name goes with the next release"
         warnings.warn(fault, DeprecationWarning, stacklevel=2)
@@ -50,6 +50,6 @@ class _OldNames:
 
 
 def follow_old_names() -> None:
-    """Have the import system find modules by their old names."""
+    """Make the import system find modules by their old names."""
     if not any(isinstance(finder, _OldNames) for finder in sys.meta_path):
         sys.meta_path.append(_OldNames())

@@ -14,7 +14,7 @@ _GOLDEN = 0.6180339887498949
 
 
 def cylinder_colors(ids: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
-    """Give each cylinder a colour of its own, which depends on its id alone; grey for -1.
+    """Return the colour of each cylinder, which depends only on its id; grey for -1.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def cylinder_colors(ids: NDArray[np.integer[Any]]) -> NDArray[np.uint8]:
 
 @cache
 def _color(number: int) -> tuple[int, ...]:
-    """Go round the hues in golden steps, which keep neighbours apart, in six shades by turns."""
+    """Return a colour: hues in golden steps, so that neighbours differ, in six alternating shades."""
     saturation = (0.85, 0.55, 1.0)[number % 3]
     value = (0.95, 0.7)[number % 2]
     return tuple(round(255 * part) for part in colorsys.hsv_to_rgb(number * _GOLDEN % 1.0, saturation, value))

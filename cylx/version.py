@@ -1,3 +1,3 @@
-"""The version of cylx: what results, tables and files say they were made by."""
+"""The version of cylx, as written to results, tables and files."""
 
 __version__ = "0.1.0"

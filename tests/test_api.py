@@ -147,8 +147,8 @@ def test_what_is_no_result_is_named(tmp_path):
     [
         ("", "not JSON"),
         ("[" * 10**5, "nested too deeply"),
-        ("[]", "no JSON object"),
-        ("NaN", "no JSON object"),
+        ("[]", "not a JSON object"),
+        ("NaN", "not a JSON object"),
         ('{"schema": "cylx.summary/1"}', "schema: 'cylx.summary/1' is not one of its values"),
     ],
 )

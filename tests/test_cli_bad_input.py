@@ -17,7 +17,7 @@ def rows(*columns):
 SCANS = {
     "missing": ("none.ply", None, ": no such file"),
     "empty": ("scan.ply", b"", ": is empty"),
-    "wrong magic": ("scan.ply", b"solid cube\n", ": is no PLY"),
+    "wrong magic": ("scan.ply", b"solid cube\n", ": is not PLY"),
     "truncated header": ("scan.ply", PLY[:60], ": the file ends within the PLY header"),
     "truncated body": ("scan.ply", PLY + b"0 0 0\n", ": the header promises 2 points, the file holds 1"),
     "promises": (
@@ -80,7 +80,7 @@ def test_so_is_one_from_standard_input(assert_refused, tmp_path, case):
 
 def test_a_folder_is_refused(assert_refused, tmp_path):
     (tmp_path / "scans.ply").mkdir()
-    assert_refused(3, "scans.ply: is a folder, and there is nothing to read in it", tmp_path / "scans.ply")
+    assert_refused(3, "scans.ply: is a folder with no scan in it", tmp_path / "scans.ply")
 
 
 def test_a_scan_that_may_not_be_read_is_refused(assert_refused, scan, monkeypatch):
@@ -121,21 +121,21 @@ def test_a_configuration_that_cannot_be_meant_is_refused(assert_refused, scan, t
         (["--set", "slicing.planes"], 2, "--set slicing.planes: has no key and value"),
         (["--set", "preset=best"], 2, "--set preset: 'best' is not one of its values"),
         (["--radius", "3:1"], 2, "'3:1' has its smallest radius above its largest"),
-        (["--axis", "1,2"], 2, "--axis': '1,2' is not three numbers such as 0,0,1, and not x, y or z"),
-        (["--axis", "w"], 2, "--axis': 'w' is not three numbers such as 0,0,1, and not x, y or z"),
-        (["--axis", "0,0,0"], 2, "--axis': '0,0,0' is no direction; the numbers must be finite, and one of them not 0"),
-        (["--axis", "0,inf,0"], 2, "--axis': '0,inf,0' is no direction"),
-        (["--axis", "nan,0,1"], 2, "--axis': 'nan,0,1' is no direction"),
-        (["--axis-tolerance", "5"], 2, "axis tolerance: is given without the axis that it is to hold for; give --axis"),
+        (["--axis", "1,2"], 2, "--axis': '1,2' is not three numbers such as 0,0,1, nor x, y or z"),
+        (["--axis", "w"], 2, "--axis': 'w' is not three numbers such as 0,0,1, nor x, y or z"),
+        (["--axis", "0,0,0"], 2, "--axis': '0,0,0' is not a direction; the numbers must be finite and not all 0"),
+        (["--axis", "0,inf,0"], 2, "--axis': '0,inf,0' is not a direction"),
+        (["--axis", "nan,0,1"], 2, "--axis': 'nan,0,1' is not a direction"),
+        (["--axis-tolerance", "5"], 2, "axis tolerance: is given without the axis it refers to; give --axis"),
         (["--axis", "z", "--axis-tolerance", "0"], 2, "'--axis-tolerance': 0.0 is not in the range 0<x<=90"),
         (["--axis", "z", "--axis-tolerance", "91"], 2, "'--axis-tolerance': 91.0 is not in the range 0<x<=90"),
         (["--axis", "z", "--axis-tolerance", "nan"], 2, "scene.axis_tolerance_deg: nan is not a finite number"),
         (["--axis-sd", "1"], 2, "scene.axis_sd_deg: is given without scene.axis; give that, too"),
         (["--axis", "z", "--axis-sd", "0"], 2, "'--axis-sd': 0.0 is not in the range 0<x<=90"),
-        (["--known-radius", "0"], 2, "'--known-radius': '0' is not R or R:SD in positive numbers, such as 0.05"),
-        (["--known-radius", "1:"], 2, "'1:' is not R or R:SD in positive numbers, such as 0.05 or 0.05:0.001"),
-        (["--known-radius", "1:2:3"], 2, "'1:2:3' is not R or R:SD in positive numbers"),
-        (["--known-radius", "nan"], 2, "'nan' is not R or R:SD in positive numbers"),
+        (["--known-radius", "0"], 2, "'--known-radius': '0' is not R or R:SD with positive numbers, such as 0.05"),
+        (["--known-radius", "1:"], 2, "'1:' is not R or R:SD with positive numbers, such as 0.05 or 0.05:0.001"),
+        (["--known-radius", "1:2:3"], 2, "'1:2:3' is not R or R:SD with positive numbers"),
+        (["--known-radius", "nan"], 2, "'nan' is not R or R:SD with positive numbers"),
         (
             ["--catalogue", "none.csv"],
             2,
@@ -147,7 +147,7 @@ def test_a_configuration_that_cannot_be_meant_is_refused(assert_refused, scan, t
         (["--min-coverage", "361"], 2, "'--min-coverage': 361.0 is not in the range 0<=x<=360"),
         (["--min-coverage", "-1"], 2, "'--min-coverage': -1.0 is not in the range 0<=x<=360"),
         (["--min-coverage", "wide"], 2, "'--min-coverage': 'wide' is not a valid float"),
-        (["--set", "scene.axis=[0, 0, 0]"], 2, "--set scene: axis [0, 0, 0] is no direction; write [0, 0, 1]"),
+        (["--set", "scene.axis=[0, 0, 0]"], 2, "--set scene: axis [0, 0, 0] is not a direction; write [0, 0, 1]"),
         (["--set", "scene.axis=[0, 1]"], 2, "--set scene.axis: [0, 1] is too short; it must have 3 or more entries"),
         (["--set", "scene.axis=z"], 2, "--set scene.axis: 'z' is not a list; write [a, b]"),
         (["--rejected", "gone/no.json"], 4, "gone/no.json: the folder "),
@@ -159,7 +159,7 @@ def test_a_configuration_that_cannot_be_meant_is_refused(assert_refused, scan, t
         (["--require", "0"], 2, "--require"),
         (["--planes", "0", "--preset", "paper"], 2, "there are no planes"),
         (["-o", "gone/out.json"], 4, "gone/out.json: the folder "),
-        (["-o", "scan.xyz/"], 4, "scan.xyz/: cannot be made: "),
+        (["-o", "scan.xyz/"], 4, "scan.xyz/: cannot be created: "),
         (["--annotated", "gone/out.ply"], 4, "gone/out.ply: the folder "),
         (["--profile", "gone/times.json"], 4, "gone/times.json: the folder "),
         (["--annotated", "."], 4, "is a folder"),

@@ -77,7 +77,7 @@ def test_kernels_that_cannot_be_kept_are_told_of(monkeypatch, tmp_path):
     monkeypatch.setattr("os.access", lambda *_: False)
     check = doctor.check_kernels()
     assert (check.state, check.needed) == ("broken", False)
-    assert check.remedy == "set NUMBA_CACHE_DIR to a folder that can be written to"
+    assert check.remedy == "set NUMBA_CACHE_DIR to a writable folder"
 
     def nowhere():
         raise RuntimeError("cannot cache function 'find_cell': no locator available")

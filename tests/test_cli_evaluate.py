@@ -88,7 +88,7 @@ def test_a_bar_that_is_missed_is_named(run_cylx, files, reached, missed, line):
 def test_errors_of_no_match_are_not_small(run_cylx, files, tmp_path):
     (tmp_path / "none.json").write_text('{"cylinders": []}')
     failed = run_cylx("evaluate", tmp_path / "none.json", files[1], "--max-angle", 1)
-    line = "cylx: angle is unknown, nothing was matched, and --max-angle 1 asks for it\n"
+    line = "cylx: angle is unknown, as nothing was matched, and --max-angle 1 needs it\n"
     assert (failed.exit_code, failed.stderr) == (1, line)
     assert (
         run_cylx("evaluate", tmp_path / "none.json", tmp_path / "none.json", "--max-angle", 1, "--min-f1", 1).exit_code
@@ -101,7 +101,7 @@ def test_errors_of_no_match_are_not_small(run_cylx, files, tmp_path):
     [
         ("", ": is empty"),
         ("{", ":1:2: not JSON"),
-        ("[]", ": holds no JSON object"),
+        ("[]", ": is not a JSON object"),
         ('{"cylinders": 3}', ": has no list 'cylinders'"),
         ('{"cylinders": [{"axis_point": [0, 0, 0]}]}', ": cylinders[0].axis_direction: is missing"),
     ],

@@ -69,7 +69,7 @@ def test_what_is_taken_off_and_what_is_left_out_is_said(run_cylx, tmp_path, resu
     done = run_cylx("export", tmp_path / "r.json", tmp_path / "a.stl", tmp_path / "a.obj", tmp_path / "a.csv")
     assert done.exit_code == 0
     _, flat, offset = done.stderr.splitlines()
-    assert flat == "warning: of height 0, and only in tables: cylinder 1"
+    assert flat == "warning: height 0, written to tables only: cylinder 1"
     assert re.fullmatch(
         r"warning: .*a\.stl: add -?\d+ 500000\d -?\d+ to all coordinates; they are too large .*", offset
     )
@@ -78,7 +78,7 @@ def test_what_is_taken_off_and_what_is_left_out_is_said(run_cylx, tmp_path, resu
 @pytest.mark.parametrize(
     ("name", "options", "code", "said"),
     [
-        ("a.dwg", [], 2, "a.dwg: .dwg is no format that is known; use one of .ply, .obj, .glb, .stl, .csv, .step, "),
+        ("a.dwg", [], 2, "a.dwg: .dwg is not a known format; use one of .ply, .obj, .glb, .stl, .csv, .step, "),
         ("a", [], 2, "a: has no suffix that names a format; use one of .ply"),
         ("a.dxf", [], 2, "a.dxf: .dxf has a unit of length; give that of the scan by --units: m, mm, cm, in, ft"),
         ("a.glb", [], 2, "a.glb: .glb has a unit of length; give that of the scan by --units"),
@@ -110,7 +110,7 @@ def test_a_missing_extra_is_named_before_anything_is_written(run_cylx, tmp_path,
     ("text", "said"),
     [
         ("{}", "cylx_version: is missing"),
-        ("[1]", "holds no JSON object"),
+        ("[1]", "is not a JSON object"),
         ("hello", "not JSON"),
         ('{"schema": "cylx.rejected/1"}', "schema"),
     ],

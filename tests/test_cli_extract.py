@@ -141,8 +141,8 @@ def test_an_existing_folder_takes_the_outputs(run_cylx, scan, tmp_path):
         (
             ["a.ply", "./a.pcd"],
             {},
-            "a.cylinders.json: would be the result of a.ply and of ./a.pcd; rename one of them, or take each by itself"
-            " into a folder of its own",
+            "a.cylinders.json: would be the result of a.ply and of ./a.pcd; rename one of them, or run each by itself"
+            " into its own folder",
         ),
         (["a.ply"], {"output": "a.ply"}, "a.ply: is an input as well as an output; choose another name"),
         (["a.ply"], {"annotated": "./a.ply"}, "./a.ply: is an input as well as an output; choose another name"),
@@ -400,7 +400,7 @@ def test_the_same_name_in_two_folders_is_fine(run_cylx, scan, tmp_path):
     line = (
         f"cylx: {tmp_path / 'scan.cylinders.json'}: would be the result of {scan} and of {twin}; rename one of them, or"
     )
-    assert (failed.exit_code, failed.stderr) == (2, f"{line} take each by itself into a folder of its own\n")
+    assert (failed.exit_code, failed.stderr) == (2, f"{line} run each by itself into its own folder\n")
 
 
 # on a terminal

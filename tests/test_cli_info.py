@@ -75,7 +75,7 @@ def test_a_cloud_without_shape_is_shown_with_a_warning(run_cylx, tmp_path, lines
     path.write_text("\n".join(lines))
     shown = run_cylx("info", path)
     assert shown.exit_code == 0
-    assert shown.stderr == f"warning: {path}: {fault}; cylinders cannot be looked for in it\n"
+    assert shown.stderr == f"warning: {path}: {fault}; no cylinders can be found in it\n"
     assert f"{len(lines)}, {finite} of them finite" in shown.stdout
     assert "spacing" not in shown.stdout
 
@@ -114,7 +114,7 @@ def test_memory_that_may_not_suffice_is_told_of(run_cylx, tmp_path, scene, monke
     path = tmp_path / "can.xyz"
     write_cloud(path, scene.points, properties=None)
     monkeypatch.setattr("cylx.cli.info.free_memory", lambda: available)
-    fault = "'cylx extract' takes about 0.25 GB, and 0.001 GB are free; take a part of the scan by --crop or --voxel"
+    fault = "'cylx extract' needs about 0.25 GB, and 0.001 GB are free; take a part of the scan by --crop or --voxel"
     shown = run_cylx("info", path)
     assert (shown.exit_code, shown.stderr) == (0, f"warning: {path}: {fault}\n" if scarce else "")
 

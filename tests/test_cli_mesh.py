@@ -48,7 +48,7 @@ def test_no_cylinder_has_no_mesh_and_is_done_all_the_same(run_cylx, scan, tmp_pa
     done = run_cylx(*command, "--overwrite")
     assert done.exit_code == 0
     assert done.stderr.splitlines()[0].endswith(f"0 cylinders, written to {tmp_path / 'scan.cylinders.json'}")
-    assert f"warning: {tmp_path / 'a.obj'}: is not written, as there is no cylinder" in done.stderr.splitlines()
+    assert f"warning: {tmp_path / 'a.obj'}: not written, as there are no cylinders" in done.stderr.splitlines()
     assert names(tmp_path) == ["scan.cylinders.json", "scan.xyz"]  # nor is there that of the cylinders before
 
 
@@ -94,11 +94,15 @@ def test_what_is_taken_off_far_from_the_origin_is_said(run_cylx, scan, tmp_path,
 @pytest.mark.parametrize(
     ("options", "code", "said"),
     [
-        (["--mesh", "a.csv"], 2, "--mesh a.csv: .csv is no mesh; use .ply, .obj, .glb or .stl; 'cylx export' writes"),
-        (["--mesh", "a.dwg"], 2, "a.dwg: .dwg is no format that is known; use one of .ply, .obj"),
+        (
+            ["--mesh", "a.csv"],
+            2,
+            "--mesh a.csv: .csv is not a mesh format; use .ply, .obj, .glb or .stl; 'cylx export' writes",
+        ),
+        (["--mesh", "a.dwg"], 2, "a.dwg: .dwg is not a known format; use one of .ply, .obj"),
         (["--mesh", "-"], 2, "-: has no suffix that names a format; use one of .ply"),
         (["--mesh", "a.glb"], 2, "a.glb: .glb has a unit of length; give that of the scan by --units: m, mm, cm"),
-        (["--units", "m"], 2, "--units: is that of a mesh, and none is asked for; give --mesh FILE, or leave it out"),
+        (["--units", "m"], 2, "--units: is for meshes, and none is requested; give --mesh FILE, or leave it out"),
         (["--mesh", "there.stl"], 4, "there.stl: exists already; choose another name, or give --overwrite"),
         (["--mesh", "none/a.stl"], 4, "none/a.stl: the folder"),
         (["--mesh", "a.stl", "--report", "a.stl"], 2, "a.stl: is asked for by two outputs; choose another name"),

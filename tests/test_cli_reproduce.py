@@ -164,9 +164,9 @@ def test_the_scan_is_for_figures_that_need_one(run_cylx, tmp_path, small, at_onc
     [
         (
             [7, "--curves", "gt,msca"],
-            "--curves gt,msca: 'msca' is no method; the methods are gt, msac, line-fit, tran, ",
+            "--curves gt,msca: 'msca' is not a method; the methods are gt, msac, line-fit, tran, ",
         ),
-        ([7, "--curves", ""], "--curves : '' is no method"),
+        ([7, "--curves", ""], "--curves : '' is not a method"),
         ([11, "--curves", "gt", "--data", "can.xyz"], "--curves gt: figure 11 has none of them; leave --curves out"),
         ([11], "--data: figure 11 needs the scan of a can; give one by --data FILE"),
         ([7, 11, 12], "--data: figures 11 and 12 need the scan of a can; give one by --data FILE"),
@@ -190,10 +190,10 @@ def test_what_cannot_be_meant_is_refused(run_cylx, tmp_path, small, at_once, arg
     [
         (None, ": no such file"),
         (b"", ": is empty"),
-        (b"solid can\n", ": is no PLY"),
+        (b"solid can\n", ": is not PLY"),
         (
             f"{HEADER}element face 1\nproperty list uchar int vertex_index\nend_header\n{VERTICES}3 0 1 9\n".encode(),
-            ": has faces of points that there are not; save the mesh again",
+            ": has faces that refer to missing points; save the mesh again",
         ),
     ],
 )
@@ -214,7 +214,7 @@ def test_a_folder_that_cannot_be_made_is_refused(run_cylx, tmp_path, small, at_o
         failed = run_cylx("reproduce", 7, "--out", out)
         (line,) = failed.stderr.splitlines()
         assert (failed.exit_code, at_once) == (4, [])
-        assert line.startswith(f"cylx: {out}: cannot be made: ")
+        assert line.startswith(f"cylx: {out}: cannot be created: ")
     assert (tmp_path / "file").read_text() == "precious"
 
 
@@ -222,7 +222,7 @@ def test_a_folder_that_cannot_be_made_is_refused(run_cylx, tmp_path, small, at_o
 def test_a_foreign_table_stays(run_cylx, tmp_path, small, at_once, content):
     (tmp_path / "figure-7.csv").write_bytes(content)
     failed = run_cylx("reproduce", 7, "--out", tmp_path)
-    line = f"cylx: {tmp_path / 'figure-7.csv'}: is there, and is no table of trials; give another folder by --out\n"
+    line = f"cylx: {tmp_path / 'figure-7.csv'}: exists and is not a table of trials; give another folder by --out\n"
     assert (failed.exit_code, failed.stderr, at_once) == (4, line, [])
     assert (tmp_path / "figure-7.csv").read_bytes() == content
     assert names(tmp_path) == ["figure-7.csv"]

@@ -111,7 +111,7 @@ def test_info_is_about_the_selected_points(run_cylx, tmp_path):
         (["--crop", "0,0,3:1,1,0"], "'0,0,3:1,1,0' has its smallest z above its largest"),
         (["--voxel", "0"], "0.0 is not in the range"),
         (["--every", "0"], "0 is not in the range"),
-        (["--classes", "2,ground"], "'2,ground' is not made of numbers of classes such as 2,6"),
+        (["--classes", "2,ground"], "'2,ground' is not a list of class numbers such as 2,6"),
         (["--scan", "-1"], "-1 is not in the range"),
     ],
 )
@@ -135,7 +135,7 @@ def test_nothing_selected_is_one_line(run_cylx, scan):
 
 def test_a_scan_is_chosen_of_an_e57_file_only(run_cylx, scan):
     done = run_cylx("extract", scan, "--scan", "0")
-    fault = "is no E57 file, of which a scan could be chosen; leave --scan out"
+    fault = "is not E57, so no scan can be chosen; leave --scan out"
     assert (done.exit_code, done.stderr) == (3, f"cylx: {scan}: {fault}\n")
 
 
@@ -157,5 +157,5 @@ def test_a_selection_in_python(tmp_path):
     found = cylx.extract(scene.points, every=2, crop=((None, None, None), (None, None, 90.0)))
     assert len(found.labels) == len(found.cloud.points) == 2000
     assert [round(fit.cylinder.radius, 1) for fit in found.cylinders] == [1.0]
-    with pytest.raises(ValueError, match="a scan can be chosen of a file only"):
+    with pytest.raises(ValueError, match="scan needs a file, and an array was given"):
         cylx.extract(scene.points, scan=0)

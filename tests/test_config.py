@@ -114,7 +114,7 @@ def test_a_tolerance_may_be_given_apart_from_its_axis_but_not_without():
     options = named_options(axis_tolerance_deg=5)
     check_tolerance(load_config(overrides=["scene.axis=[0, 0, 1]"], options=options), options)
     check_tolerance(load_config(overrides=["scene.axis_tolerance_deg=5"]), {})
-    with pytest.raises(ConfigError, match="axis tolerance: is given without the axis that it is to hold for"):
+    with pytest.raises(ConfigError, match="axis tolerance: is given without the axis it refers to"):
         check_tolerance(load_config(options=options), options)
 
 
@@ -205,7 +205,7 @@ REFUSED = [
         "slicing: {planes: 0}\ncandidates: {sources: [slices]}",
         "my.yaml: there are no planes, and candidates.sources has slices alone; raise slicing.planes",
     ),
-    ("scene: {axis: [0, 0, 0]}", "my.yaml: scene: axis [0, 0, 0] is no direction; write [0, 0, 1] for upright"),
+    ("scene: {axis: [0, 0, 0]}", "my.yaml: scene: axis [0, 0, 0] is not a direction; write [0, 0, 1] for upright"),
     (
         "scene: {axis: [0, 1, 2, 3]}",
         "my.yaml: scene.axis: [0, 1, 2, 3] is too long; it must have 3 or fewer entries",

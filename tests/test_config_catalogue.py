@@ -56,7 +56,7 @@ def test_one_column_is_enough(read):
 REMEDY = "give a CSV file with a column 'radius' or 'diameter'"
 HEADER = "begin with a line that names the columns, such as 'name,radius,tolerance'"
 ENTRY = "write '- {name: DN50, radius: 0.03015}'"
-NAME = "name: the name is no name; write 1 to 40 printable characters without spaces around them"
+NAME = "name: the name is invalid; write 1 to 40 printable characters without spaces around them"
 REFUSED = [
     ("pipes.csv", "", f"pipes.csv: is empty; {HEADER}"),
     ("pipes.csv", "\n# nothing\n", f"pipes.csv: is empty; {HEADER}"),
@@ -64,7 +64,7 @@ REFUSED = [
     ("pipes.csv", b"\x89PNG\r\n\x1a\n\xff", f"pipes.csv: is not UTF-8 text; {REMEDY}"),
     ("pipes.csv", "radius\n1\0\n", f"pipes.csv: is not text; {REMEDY}"),
     ("pipes.csv", "radius\n" + 50_000 * "1\n", f"pipes.csv: is larger than 100 kB; {REMEDY}"),
-    ("pipes.csv", "0.1,0.2\n", f"pipes.csv:1: is no header line; {HEADER}"),
+    ("pipes.csv", "0.1,0.2\n", f"pipes.csv:1: is not a header line; {HEADER}"),
     ("pipes.csv", "radios\n1\n", "pipes.csv:1: unknown column 'radios'; did you mean 'radius'?"),
     (
         "pipes.csv",
@@ -118,8 +118,8 @@ REFUSED = [
     ),
     ("pipes.yaml", "", "pipes.yaml: has no entries; give each nominal radius a line"),
     ("pipes.yaml", "[]", "pipes.yaml: has no entries; give each nominal radius a line"),
-    ("pipes.yaml", "radius: 1", f"pipes.yaml: is no list of entries; {ENTRY} for each of them"),
-    ("pipes.yaml", "- radius: 1\n- 2\n", f"pipes.yaml:2: is no entry; {ENTRY}"),
+    ("pipes.yaml", "radius: 1", f"pipes.yaml: is not a list of entries; {ENTRY} for each of them"),
+    ("pipes.yaml", "- radius: 1\n- 2\n", f"pipes.yaml:2: is not an entry; {ENTRY}"),
     ("pipes.yaml", "- radius: 1\n\n- radus: 2\n", "pipes.yaml:3: radius: is missing; add it"),
     ("pipes.yaml", "- radius: 1\n  radus: 2\n", "pipes.yaml:1: radus: unknown key; did you mean 'radius'?"),
     ("pipes.yaml", "- radius: 1\n- radius: 0\n", "pipes.yaml:2: radius: 0 is out of range; it must be > 0"),

@@ -206,11 +206,11 @@ def test_an_evaluation_is_json():
         ),
         (
             document(cylinder(), cylinder(radius=0.0)),
-            "truth.cylinders[1]: has no finite axis or no radius > 0; mend its numbers, or leave it out",
+            "truth.cylinders[1]: has no finite axis or no radius > 0; correct its numbers, or leave it out",
         ),
         (
             document(cylinder(point=(math.nan, 0, 0))),
-            "truth.cylinders[0]: has no finite axis or no radius > 0; mend its numbers, or leave it out",
+            "truth.cylinders[0]: has no finite axis or no radius > 0; correct its numbers, or leave it out",
         ),
     ],
 )

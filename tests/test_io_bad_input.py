@@ -40,7 +40,7 @@ def pcd(body=b"", **changed):
 
 PLY = {
     b"": "scan: is empty; check how it was made",
-    b"PLY\n": "scan: is no PLY: it does not begin with the line 'ply'; give it its right suffix",
+    b"PLY\n": "scan: is not PLY: it does not begin with the line 'ply'; give it its right suffix",
     b"ply": f"scan: the file ends within the PLY header; {COPY}",
     ply()[:-1]: f"scan: the file ends within the PLY header; {COPY}",
     b"ply\n" + b"comment\n" * 140000: "scan: the PLY header has no end; export the file again",
@@ -52,18 +52,18 @@ PLY = {
     ply("element vertex -1\n"): f"scan:3: element 'vertex' has the impossible count '-1'; {PLY_AGAIN}",
     ply("element vertex 1e3\n"): f"scan:3: element 'vertex' has the impossible count '1e3'; {PLY_AGAIN}",
     ply(f"element vertex {'9' * 30}\n"): f"scan:3: element 'vertex' has the impossible count '{'9' * 30}'; {PLY_AGAIN}",
-    ply("element vertex\n"): f"scan:3: 'vertex' is no name and count of an element; {PLY_AGAIN}",
-    ply("element vertex 1\nproperty half x\n"): f"scan:4: 'half x' is no type and name of a property; {PLY_AGAIN}",
-    ply("element vertex 1\nproperty list int x\n"): "scan:4: 'list int x' is no type and name of a property; "
+    ply("element vertex\n"): f"scan:3: 'vertex' is not the name and count of an element; {PLY_AGAIN}",
+    ply("element vertex 1\nproperty half x\n"): f"scan:4: 'half x' is not a property type and name; {PLY_AGAIN}",
+    ply("element vertex 1\nproperty list int x\n"): "scan:4: 'list int x' is not a property type and name; "
     + PLY_AGAIN,
-    ply("element vertex 1\nproperty a b c d\n"): f"scan:4: 'a b c d' is no type and name of a property; {PLY_AGAIN}",
-    ply("property float x\n"): f"scan:3: 'property float x' is no line of a PLY header; {PLY_AGAIN}",
-    ply("\x1b[31mhello\n"): f"scan:3: '\\x1b[31mhello' is no line of a PLY header; {PLY_AGAIN}",
+    ply("element vertex 1\nproperty a b c d\n"): f"scan:4: 'a b c d' is not a property type and name; {PLY_AGAIN}",
+    ply("property float x\n"): f"scan:3: 'property float x' is not a line of a PLY header; {PLY_AGAIN}",
+    ply("\x1b[31mhello\n"): f"scan:3: '\\x1b[31mhello' is not a line of a PLY header; {PLY_AGAIN}",
     ply("element face 1\nproperty float x\n"): "scan: the PLY header has no vertex element; give a PLY with points",
     ply("element vertex 1\nproperty float x\n"): "scan: the vertex element has no property y, z; "
     "give a PLY with x, y and z",
     ply(f"element vertex 1\n{XYZ}".replace("float y", "list uchar float y")): "scan: the property y is a list; "
-    "give a PLY with one x, y and z a point",
+    "give a PLY with one x, y and z per point",
     ply(
         f"element vertex 1\n{XYZ}property int x\n"
     ): f"scan: the vertex element has the property 'x' twice; {PLY_AGAIN}",
@@ -96,12 +96,12 @@ PLY = {
 }
 PCD = {
     b"": "scan: is empty; check how it was made",
-    b"hello\n": "scan: is no PCD: it does not begin with its header; give it its right suffix",
-    b"hello": "scan: is no PCD: it does not begin with its header; give it its right suffix",
+    b"hello\n": "scan: is not PCD: it does not begin with its header; give it its right suffix",
+    b"hello": "scan: is not PCD: it does not begin with its header; give it its right suffix",
     b"VERSION 0.7\n": f"scan: the file ends within the PCD header; {COPY}",
     pcd()[:-1]: f"scan: the file ends within the PCD header; {COPY}",
     b"VERSION 0.7\n" * 100000: f"scan: the PCD header has no end; {PCD_AGAIN}",
-    b"VERSION 0.7\nhello\n": f"scan:2: 'hello' is no line of a PCD header; {PCD_AGAIN}",
+    b"VERSION 0.7\nhello\n": f"scan:2: 'hello' is not a line of a PCD header; {PCD_AGAIN}",
     pcd(FIELDS="x y i"): "scan: FIELDS has no z; give a PCD with x, y and z",
     pcd(FIELDS=None): "scan: FIELDS has no x, y, z; give a PCD with x, y and z",
     pcd(SIZE="4 4"): f"scan: 3 FIELDS, but SIZE has 2; {PCD_AGAIN}",
@@ -109,8 +109,8 @@ PCD = {
     pcd(SIZE="4 4 -4"): f"scan: SIZE is '4 4 -4', not made of counts; {PCD_AGAIN}",
     pcd(TYPE="F F Q"): f"scan: field 'z' has the unknown type 'Q' of size 4; {PCD_AGAIN}",
     pcd(SIZE="4 4 2"): f"scan: field 'z' has the unknown type 'F' of size 2; {PCD_AGAIN}",
-    pcd(COUNT="1 1 2"): "scan: field z has 2 values; give a PCD with one x, y and z a point",
-    pcd(COUNT=f"1 1 {10**12}"): f"scan: expected at most 4096 values a point, found 1000000000002; {PCD_AGAIN}",
+    pcd(COUNT="1 1 2"): "scan: field z has 2 values; give a PCD with one x, y and z per point",
+    pcd(COUNT=f"1 1 {10**12}"): f"scan: expected at most 4096 values per point, found 1000000000002; {PCD_AGAIN}",
     pcd(WIDTH="3"): f"scan: WIDTH x HEIGHT is 3, but POINTS is 2; {PCD_AGAIN}",
     pcd(POINTS=""): f"scan: the PCD header does not say how many POINTS there are; {PCD_AGAIN}",
     pcd(POINTS=None, HEIGHT=None): f"scan: the PCD header does not say how many POINTS there are; {PCD_AGAIN}",
@@ -163,7 +163,7 @@ TEXT = {
     b"nan nan nan\n": NO_FINITE,
 }
 OTHER = {
-    b"\0\1\2\3": "scan: is of no format that cylx reads, and no text; convert it to PLY",
+    b"\0\1\2\3": "scan: is neither text nor of a format that cylx reads; convert it to PLY",
     b"LASF\0\0": "scan: the file ends within the LAS header; get a complete copy of the file",
     b"#!/bin/sh\necho\nexit 0\n": f"scan:3: x is 'exit', not a number; {NUMBERS}",
 }

@@ -69,7 +69,7 @@ def test_one_scan_can_be_chosen(scans):
 
 
 def test_a_scan_of_another_format_cannot_be_chosen(scan):
-    with pytest.raises(InputError, match="is no E57 file, of which a scan could be chosen; leave --scan out"):
+    with pytest.raises(InputError, match="is not E57, so no scan can be chosen; leave --scan out"):
         read_cloud(scan, scan=0)
 
 
@@ -111,7 +111,7 @@ def test_damaged_files_are_one_line(scans, tmp_path):
 def test_garbage_and_no_scans(tmp_path):
     path = tmp_path / "scan.e57"
     path.write_bytes(b"garbage")
-    with pytest.raises(InputError, match="is no E57: it does not begin with ASTM-E57; give it its right suffix"):
+    with pytest.raises(InputError, match="is not E57: it does not begin with ASTM-E57; give it its right suffix"):
         read_cloud(path)
     with pye57.E57(str(tmp_path / "none.e57"), mode="w"):
         pass

@@ -38,7 +38,7 @@ def test_a_bomb_is_refused_in_one_line(tmp_path, run_cylx):
     path = tmp_path / "bomb.xyz.gz"
     path.write_bytes(gzip.compress(b"0 0 0\n" * (packed.ALWAYS_ALLOWED // 5)))
     shown = run_cylx("info", path)
-    fault = "is more than 100 times as large once it is unpacked; unpack it yourself if you trust it"
+    fault = "is more than 100 times as large when unpacked; unpack it yourself if you trust it"
     assert (shown.exit_code, shown.stderr) == (3, f"cylx: {path}: {fault}\n")
 
 
@@ -50,13 +50,13 @@ def test_what_is_small_may_expand_as_it_likes(tmp_path):
 
 WHOLE = gzip.compress(b"0 0 0\n1 2 3\n" * 50)
 BAD = {
-    "cut": (WHOLE[:-9], "the file ends within what is packed; get a complete copy of the file"),
-    "header": (WHOLE[:5], "the file ends within what is packed; get a complete copy of the file"),
+    "cut": (WHOLE[:-9], "the file ends within the packed data; get a complete copy of the file"),
+    "header": (WHOLE[:5], "the file ends within the packed data; get a complete copy of the file"),
     "checksum": (
         WHOLE[:-8] + bytes(4) + WHOLE[-4:],
-        "what is packed is damaged: CRC check failed",
+        "the packed data are damaged: CRC check failed",
     ),
-    "inside": (WHOLE[:10] + b"\xff" * 9 + WHOLE[19:], "what is packed is damaged: "),
+    "inside": (WHOLE[:10] + b"\xff" * 9 + WHOLE[19:], "the packed data are damaged: "),
     "other": (b"0 0 0\n", "is not packed by gzip; give it its right suffix"),
     "nothing": (gzip.compress(b""), "is empty; check how it was made"),
 }

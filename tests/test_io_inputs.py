@@ -109,7 +109,7 @@ def test_json_objects(tmp_path, monkeypatch):
 BAD_JSON = {
     b"": "result.json: is empty; check how it was made",
     b'{"a": 1,\n "b" 2}': "result.json:2:6: not JSON: expecting ':' delimiter; give a JSON file as cylx writes it",
-    b"[1, 2]": "result.json: holds no JSON object; give a JSON file as cylx writes it",
+    b"[1, 2]": "result.json: is not a JSON object; give a JSON file as cylx writes it",
     b'{"a": NaN}': "result.json: not JSON: NaN is not a number in JSON; give a JSON file as cylx writes it",
     b'{"a": "\xff"}': "result.json: not JSON: not UTF-8 text; give a JSON file as cylx writes it",
     b"[" * 100_000: "result.json: not JSON: nested too deeply; give a JSON file as cylx writes it",

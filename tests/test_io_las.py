@@ -123,7 +123,7 @@ def with_bytes(data, place, new):
 
 
 BAD = {
-    "garbage": (b"garbage", "is no LAS: it does not begin with LASF; give it its right suffix"),
+    "garbage": (b"garbage", "is not LAS: it does not begin with LASF; give it its right suffix"),
     "short": (b"LASF" + bytes(90), "the file ends within the LAS header; get a complete copy of the file"),
     "empty": (b"", "is empty; check how it was made"),
     "no points": (las_bytes(steps=STEPS[:0]), "holds no points; give a file with points"),

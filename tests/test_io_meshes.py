@@ -12,9 +12,9 @@ from cylx.io import read_object
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], "f4")
 FACES = [[0, 1, 2], [0, 3, 1], [1, 3, 2]]
-NO_TRIANGLES = "has faces that are no triangles; triangulate the mesh"
-NO_POINTS = "has faces of points that there are not; save the mesh again"
-NO_INTEGERS = "the property {} is no list of integers; save the mesh again"
+NO_TRIANGLES = "has faces that are not triangles; triangulate the mesh"
+NO_POINTS = "has faces that refer to missing points; save the mesh again"
+NO_INTEGERS = "the property {} is not a list of integers; save the mesh again"
 VERTICES = "".join(f"{x:g} {y:g} {z:g}\n" for x, y, z in CORNERS)
 
 
@@ -125,7 +125,7 @@ def test_a_mesh_from_a_stream_is_refused(monkeypatch):
         buffer = io.BytesIO(BINARY)
 
     monkeypatch.setattr("sys.stdin", Stream)
-    with pytest.raises(InputError, match=r"^-: is no file, and a mesh is read twice; save it to a file$"):
+    with pytest.raises(InputError, match=r"^-: is not a file, and a mesh has to be read twice; save it to a file$"):
         read_object("-")
 
 

@@ -79,11 +79,11 @@ WRONG = {
     "number": (np.array(3.0), "has the shape (), not (N, 3); give an array of shape (N, 3) or wider"),
     "complex": (POINTS.astype(complex), "is made of complex128, not of numbers; give an array of floats"),
     "words": (np.full((9, 3), "a"), "is made of <U1, not of numbers; give an array of floats"),
-    "objects": (POINTS.astype(object), "holds Python objects, which are not read; save an array of numbers"),
+    "objects": (POINTS.astype(object), "holds Python objects, which are not supported; save an array of numbers"),
     "no z": (np.zeros(5, [("x", "f8"), ("y", "f8")]), "the structured array has no field z; give one with x, y and z"),
     "two x": (
         np.zeros(5, [("x", "f8", 2), ("y", "f8"), ("z", "f8")]),
-        "the field x has several values a point; give one x, y and z a point",
+        "the field x has several values per point; give one x, y and z per point",
     ),
     "name": (
         np.zeros(5, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("who", "U5")]),
@@ -145,7 +145,7 @@ def test_damaged_archives_are_one_line(put, tmp_path):
 def test_a_bomb_is_refused(tmp_path):
     with zipfile.ZipFile(tmp_path / "bomb.npz", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("points.npy", npy(np.zeros((10**6, 3))))
-    with pytest.raises(InputError, match="is more than 100 times as large once it is unpacked"):
+    with pytest.raises(InputError, match="is more than 100 times as large when unpacked"):
         read_cloud(tmp_path / "bomb.npz")
 
 

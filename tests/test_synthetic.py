@@ -204,7 +204,7 @@ def test_a_room_may_be_empty():
         (
             multi,
             {"cylinders": 0, "planes": 0, "boxes": 0, "spheres": 0, "cones": 0},
-            "noise: must be 1 where there is no surface at all; choose another value",
+            "noise: must be 1 if there is no surface; choose another value",
         ),
         (
             multi,

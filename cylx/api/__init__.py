@@ -1,4 +1,4 @@
-"""The whole method in one call, and what it found as other programs want it."""
+"""The whole method in one call, and its results for other programs."""
 
 from __future__ import annotations
 
@@ -55,47 +55,47 @@ def extract(
     method : str, optional
         `gt`, the clustering game, or one of its competitors, `msac`, `line-fit`, `tran` and `jin`.
     preset : str, optional
-        `auto` or `paper`; by default the one of the configuration, or `auto`.
+        `auto` or `paper`; by default that of the configuration, or `auto`.
     config : Config, str or Path, optional
         The configuration, or a YAML file.
     overrides : sequence of str
-        Each `section.key=value`, over the configuration.
+        Each `section.key=value`; they override the configuration.
     seed : int, optional
-        Seed of everything random.
+        Random seed.
     radius : pair of float or None, optional
         Smallest and largest radius, in the unit of the points; None sets no limit.
     max_cylinders : int, optional
-        Most cylinders extracted.
+        Maximum number of cylinders.
     planes : int, optional
         Number of planes through the whole cloud.
     axis : sequence of float or str, optional
-        Direction of the cylinders looked for: three numbers, or `x`, `y` or `z`; length and sign do not matter.
+        Direction of the cylinders to find: three numbers, or `x`, `y` or `z`; length and sign do not matter.
     axis_tolerance_deg : float, optional
-        Largest angle of a cylinder to `axis`, degrees; 10 by default.
+        Largest angle between a cylinder and `axis`, degrees; 10 by default.
     axis_sd_deg : float, optional
-        Standard deviation of the cylinders' tilts from `axis`, degrees: each fit is drawn to it.
+        Standard deviation of the cylinders' tilts from `axis`, degrees: a prior for each fit.
     known_radius : pair of float, optional
-        Radius that the cylinders are known to have, in the unit of the points, and its standard deviation (None: a
-        thousandth of it): each fit is drawn to it that does not contradict it.
+        Known radius of the cylinders, in the unit of the points, and its standard deviation (None: a thousandth of the
+        radius): a prior for each fit that does not contradict it.
     catalogue : str, Path, or sequence of mapping or float, optional
         Nominal radii, in the unit of the points: a CSV or YAML file, entries with `name`, `radius` and `tolerance` as
-        in the configuration, or just radii. Each fit is drawn to the one that it bears out.
+        in the configuration, or just radii. The one that a fit supports becomes its prior.
     min_coverage_deg : float, optional
-        Smallest angle about its axis that must be seen of a cylinder, degrees.
+        Smallest angle of the surface that must be seen, about the axis, degrees.
     crop : pair of triples of float or None, optional
-        Smallest and largest coordinates of the points that take part; None sets no bound.
+        Smallest and largest coordinates of the points to use; None sets no bound.
     voxel : float, optional
-        Side of cells of which one point each takes part, in the unit of the points.
+        Side of the cells in which only one point is used, in the unit of the points.
     every : int, optional
-        Only the first of so many rows takes part.
+        Use only the first of this many rows.
     classes : sequence of int, optional
-        Classes of the points that take part; for files that have them, as LAS and LAZ do.
+        Use only points of these classes; for files that have classes, as LAS and LAZ do.
     scan : int, optional
-        The scan of an E57 file to read, the first is 0; by default all.
+        Number of the scan of an E57 file to read, from 0; by default all.
     threads : int, optional
-        Number of threads; the result does not depend on it. By default one a core.
+        Number of threads; the result does not depend on it. By default one per core.
     observer : Observer, optional
-        Told of the progress.
+        Receives the progress.
 
     Returns
     -------
@@ -106,9 +106,9 @@ def extract(
     ConfigError
         If the settings have an unknown key, a wrong type or an impossible value.
     InputError
-        If the file cannot be read, or the cloud holds nothing that could be worked on.
+        If the file cannot be read, or the cloud is unusable.
     ValueError
-        If the array has not the shape (N, 3), or the selection of points is an impossible one.
+        If the shape of the array is not (N, 3), or the selection of points is impossible.
 
     Examples
     --------
@@ -144,7 +144,7 @@ def extract(
     if isinstance(points_or_path, str | PathLike):
         cloud = read_cloud(Path(points_or_path), scan=scan)
     elif scan is not None:
-        raise ValueError("a scan can be chosen of a file only")
+        raise ValueError("scan needs a file, and an array was given")
     elif isinstance(points_or_path, PointCloud):
         cloud = points_or_path
     else:
@@ -165,7 +165,7 @@ def read_result(path: str | PathLike[str]) -> Result:
     Raises
     ------
     InputError
-        If the file cannot be read, or is no result of this version of the format.
+        If the file cannot be read, or is not a result of this version of the format.
     """
     return Result.parse(read_json(Path(path)), str(path))
 
@@ -215,7 +215,7 @@ def _document(given: Mapping[str, object] | Extraction | Result | str | PathLike
 
 
 def to_dict(extraction: Extraction) -> dict[str, Any]:
-    """Give an extraction as the JSON object that `cylx extract` writes.
+    """Return an extraction as the JSON object that `cylx extract` writes.
 
     Parameters
     ----------
@@ -232,9 +232,9 @@ def to_dict(extraction: Extraction) -> dict[str, Any]:
 
 
 def to_dataframe(found: Extraction | Result) -> Any:  # noqa: ANN401  pandas is an extra
-    """Give the cylinders as a pandas data frame, one row each.
+    """Return the cylinders as a pandas data frame, one row each.
 
-    Vectors have a column for each of x, y and z, and keys of inner objects follow that of the object:
+    Vectors have a column for each of x, y and z. Keys of inner objects follow the name of the object:
     `uncertainty_radius` is the standard deviation of the radius.
 
     Parameters

@@ -1,7 +1,7 @@
-"""The paper's four competitors (section 4.2), behind the same interface as its own method.
+"""The paper's four competitors (section 4.2), with the same interface as its own method.
 
-None of them was published with its program; each module says where its method comes from and how we read it. They use
-the same cloud, priors on radius and direction, extents, labels and outputs; they verify nothing and have no confidence.
+None of them was published as a program; each module gives the source of its method and our reading of it. They use the
+same cloud, limits on radius and direction, extents, labels and outputs. They verify nothing and have no confidence.
 """
 
 from cylx.baselines.jin import find_by_spheres

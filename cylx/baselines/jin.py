@@ -1,15 +1,15 @@
 """Jin and Lee: spheres that roll within a pipe, and a line through their centres.
 
 After Y.-H. Jin and W.-H. Lee, "Fast cylinder shape matching using random sample consensus in large scale point
-cloud", Applied Sciences 9 (2019), and what the paper says of it: no normals; spheres fitted in small neighbourhoods of
-points by RANSAC; axis and radius from all spheres. Of a straight pipe the centres lie on the axis, which principal
-components tell from a bend.
+cloud", Applied Sciences 9 (2019), and the paper's description of it: no normals; spheres fitted in small neighbourhoods
+of points by RANSAC; axis and radius from all spheres. The centres of a straight pipe lie on the axis, which principal
+components distinguish from a bend.
 
-Our readings: a neighbourhood is a ball, and without a radius given, balls of many sizes are tried, for the sphere has
-to be as large as the pipe; a sphere is the one through four points with the most points near its surface (a
-least-squares sphere of a small patch has twice the pipe's radius); lines are found by RANSAC over the centres, one
-after the other, and fitted by principal components; the radius is the median of their spheres'. The lengths and bends
-of pipes, which the original goes on to, are left out, as in the paper.
+Our readings: a neighbourhood is a ball; if no radius is given, balls of many sizes are tried, as the sphere has to be
+as large as the pipe. A sphere is the one through four points with the most points near its surface (a least-squares
+sphere of a small patch has twice the pipe's radius). Lines are found by RANSAC over the centres, one after the other,
+and fitted by principal components. The radius is the median of those of the spheres. The lengths and bends of pipes,
+which the original also finds, are left out, as in the paper.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from cylx.records import Frame, stream
 SMALLEST, LARGEST = 6.0, 0.25
 """Radii of neighbourhoods: in spacings, and as a share of the extent."""
 ENOUGH_OF_A_BALL = 2000
-"""Points of a neighbourhood that suffice."""
+"""Maximum number of points used in a neighbourhood."""
 LEAST_POINTS_OF_BALL = 8
 NEAR_IN_RADII = 1.5
-"""Centres within so many radii of a sphere's centre tell whether the pipe is straight there."""
+"""Centres within this many radii of a sphere's centre show whether the pipe is straight there."""
 
 
 def find_by_spheres(
@@ -78,7 +78,7 @@ def find_by_spheres(
 
 
 def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, seed: int, threads: int) -> FloatArray:
-    """Look for a sphere about each of many points; give centre and radius of those found, shape (n, 4)."""
+    """Search for a sphere about each of many points; return centre and radius of those found, shape (n, 4)."""
     rng = stream(seed, "ball places")
     extent = float(np.linalg.norm(np.ptp(frame.points, axis=0)))
     lowest, highest = min(SMALLEST, LARGEST * extent), LARGEST * extent
@@ -111,7 +111,7 @@ def _find_spheres(frame: Frame, radii: tuple[float, float], config: JinConfig, s
 def _search_sphere(
     points: FloatArray, samples: IndexArray, distance: float, least: float, greatest: float, best: FloatArray
 ) -> int:
-    """Fill `best` with centre and radius of the sphere through four points that has the most support; count it."""
+    """Fill `best` with centre and radius of the sphere through four points with most support; return the support."""
     record = 0
     for k in range(len(samples)):
         a = samples[k, 0]
@@ -142,7 +142,7 @@ def _search_sphere(
 
 @njit(cache=True, nogil=True)
 def _det(m: FloatArray, a: int, b: int, c: int) -> float:
-    """Give the determinant of three columns of a matrix of three rows."""
+    """Return the determinant of three columns of a matrix of three rows."""
     return float(
         m[0, a] * (m[1, b] * m[2, c] - m[1, c] * m[2, b])
         - m[0, b] * (m[1, a] * m[2, c] - m[1, c] * m[2, a])
@@ -151,7 +151,7 @@ def _det(m: FloatArray, a: int, b: int, c: int) -> float:
 
 
 def _straight(spheres: FloatArray, linearity: float) -> MaskArray:
-    """Tell which spheres lie where the pipe is straight: their neighbours' centres spread along a line."""
+    """Return which spheres lie where the pipe is straight: their neighbours' centres spread along a line."""
     straight = np.zeros(len(spheres), np.bool_)
     for k, sphere in enumerate(spheres):
         near = spheres[((spheres[:, :3] - sphere[:3]) ** 2).sum(axis=1) < (NEAR_IN_RADII * sphere[3]) ** 2, :3]
@@ -163,7 +163,7 @@ def _straight(spheres: FloatArray, linearity: float) -> MaskArray:
 
 
 def _best_line(spheres: FloatArray, pairs: IndexArray, distance: float, limits: Limits) -> MaskArray:
-    """Give the spheres that the best supported line through two centres goes through."""
+    """Return the spheres on the best supported line through two centres."""
     best = np.zeros(len(spheres), np.bool_)
     for i, j in pairs:
         line = spheres[j, :3] - spheres[i, :3]

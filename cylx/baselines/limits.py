@@ -1,4 +1,4 @@
-"""What the cylinders looked for must keep to, as all competitors are told it."""
+"""Limits on the cylinders to find, in one form for all competitors."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from cylx.geometry.arrays import FloatArray
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Which radii and directions cylinders may have.
+    """Limits on radius and direction.
 
     Parameters
     ----------
     radii : tuple of float
         Least and greatest radius, frame units.
     axis : ndarray of shape (3,) or None
-        Unit direction of the axes looked for; None if any will do.
+        Unit direction of the axes; None for any.
     tilt : float
-        Greatest angle of an axis to it, radians; means nothing without it.
+        Greatest angle between an axis and this direction, radians; ignored without it.
     """
 
     radii: tuple[float, float]
@@ -30,11 +30,11 @@ class Limits:
 
     @property
     def numbers(self) -> FloatArray:
-        """The same for a kernel, shape (6,): radii, axis, and the least cosine to it, which is -1 if any will do."""
+        """The same for a kernel, shape (6,): radii, axis, and the least cosine to it, -1 for any."""
         if self.axis is None:
             return np.array([*self.radii, 0.0, 0.0, 0.0, -1.0])
         return np.array([*self.radii, *self.axis, math.cos(self.tilt)])
 
     def admit(self, direction: FloatArray) -> bool:
-        """Say whether cylinders may have this unit direction, either way."""
+        """Return whether this unit direction, up to sign, is allowed."""
         return self.axis is None or abs(float(direction @ self.axis)) >= math.cos(self.tilt)

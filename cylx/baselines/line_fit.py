@@ -1,11 +1,11 @@
 """Line fit: a line through the centres of the ellipses of all slices, and the mean of their semi-minor axes.
 
-After the method the paper takes from its reference 26 and describes in sections 3.2 and 4.2: the slices and ellipses
-are the same as those of the game, and all count alike; the cylinder is then refined by a non-linear optimisation.
+After the method that the paper takes from its reference 26 and describes in sections 3.2 and 4.2. Slices and ellipses
+are the same as for the game, all with equal weight; the cylinder is then refined by a non-linear optimisation.
 
-Our readings: of the ellipses of one slice, which are different cylinders, the best supported one counts; what is
-optimised, which is not said, is the sum of squared orthogonal distances of the points near the surface, over the five
-parameters. It is a method for one cylinder: of several it gives one that is none of them.
+Our readings: of the ellipses of one slice, which belong to different cylinders, the best supported one is used. The
+paper does not say what is optimised; here it is the sum of squared orthogonal distances of the points near the surface,
+over the five parameters. The method is for one cylinder: with several, the result fits none of them.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction
 from cylx.records import EllipseFit, Frame
 
 UNBOUNDED_WIDTH = 1e6
-"""A weight function so many radii wide is none."""
+"""With a weight function this many radii wide all points have the same weight."""
 
 
 def fit_line_of_centres(fits: list[list[EllipseFit]], frame: Frame, config: LineFitConfig) -> list[Proposal]:
@@ -37,7 +37,7 @@ def fit_line_of_centres(fits: list[list[EllipseFit]], frame: Frame, config: Line
     Returns
     -------
     list of Proposal
-        One; none if there are fewer than two ellipses.
+        One proposal; none with fewer than two ellipses.
     """
     ellipses = [max(ones, key=lambda fit: fit.inliers) for ones in fits if ones]
     if len(ellipses) < 2:

@@ -1,13 +1,13 @@
 """MSAC: sample consensus over pairs of oriented points, one cylinder after the other.
 
 After P. H. S. Torr and A. Zisserman, "MLESAC: a new robust estimator with application to estimating image geometry",
-Computer Vision and Image Understanding 78 (2000), with the cylinder through two points and their normals. What the
-paper says of it: at most 5000 iterations, a greatest distance of 3 % of the radius, normals by planes through the
-neighbours, and that all points within 5 % of the radius of a cylinder's surface are taken away before the next one.
+Computer Vision and Image Understanding 78 (2000), with the cylinder through two points and their normals. The paper's
+description: at most 5000 iterations, a greatest distance of 3 % of the radius, normals by planes through the
+neighbours, and all points within 5 % of the radius of a cylinder's surface are removed before the next search.
 
-Our readings, where it says nothing: all iterations are done, rather than as many as a wanted probability asks for;
-distance alone tells inliers, not the angle of the normals; the best sample is the answer, without a fit to its inliers
-(`refine` adds one); and the search ends with a cylinder that too small a share of the points supports.
+Our readings, where the paper says nothing: all iterations are run, rather than as many as a target probability needs;
+inliers are decided by distance only, not by the angle of the normals; the best sample is the result, without a fit to
+its inliers (`refine` adds one); and the search ends with a cylinder that too small a share of the points supports.
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ, cylinde
 from cylx.records import Frame
 
 LEAST_SINE = 1e-4
-"""Normals that are more nearly parallel than this have no axis."""
+"""Normals that are more nearly parallel than this define no axis."""
 CHUNK = 250
-"""Hypotheses a thread takes at a time; the number does not depend on that of the threads."""
+"""Hypotheses per task of a thread; does not depend on the number of threads."""
 UNBOUNDED_WIDTH = 1e6
-"""A weight function so many times wider than the inliers' distance is none."""
+"""With a weight function this many times wider than the inliers' distance all points have the same weight."""
 
 
 def find_by_consensus(
@@ -65,7 +65,7 @@ def find_by_consensus(
     ConfigError
         If open3d cannot be imported.
     """
-    # in random order the loss of a bad hypothesis exceeds the best one's after a few points
+    # in random order, the loss of a bad hypothesis exceeds the best one's after a few points
     order = rng.permutation(len(frame.points))
     points = frame.points[order]
     normals = normals_for("msac", frame.points, config.neighbours)[order]
@@ -85,7 +85,7 @@ def find_by_consensus(
             _, distances, _ = cylinder_coordinates(points, model[POINT], model[DIRECTION])
         yield Proposal.spanning(model[POINT], model[DIRECTION], float(model[RADIUS]), points[inliers], 1)
         left = np.abs(distances - model[RADIUS]) > config.removal * model[RADIUS]
-        if left.all():  # the same would be found again and again
+        if left.all():  # the same one would be found again and again
             return
         points, normals = points[left], normals[left]
 
@@ -93,7 +93,7 @@ def find_by_consensus(
 def _best_of(
     points: FloatArray, normals: FloatArray, pairs: IndexArray, distance: float, limits: FloatArray, threads: int
 ) -> FloatArray | None:
-    """Give the cylinder of least loss among those of all pairs of points."""
+    """Return the cylinder of least loss among those of all pairs of points."""
 
     def work(start: int) -> tuple[float, int, FloatArray]:
         model = np.empty(7)
@@ -109,7 +109,7 @@ def _best_of(
 def _search(
     points: FloatArray, normals: FloatArray, pairs: IndexArray, distance: float, limits: FloatArray, best: FloatArray
 ) -> float:
-    """Fill `best` (7,) with the cylinder of least loss; give the loss, infinite if no pair has a cylinder."""
+    """Fill `best` (7,) with the cylinder of least loss; return the loss, infinite if no pair gives a cylinder."""
     record = math.inf
     model = np.empty(7)
     for k in range(len(pairs)):
@@ -127,10 +127,10 @@ def _search(
 def _cylinder_through(
     points: FloatArray, normals: FloatArray, i: int, j: int, limits: FloatArray, model: FloatArray
 ) -> bool:
-    """Fill `model` with the cylinder through two oriented points; tell whether there is one within the limits.
+    """Fill `model` with the cylinder through two oriented points; return whether there is one within the limits.
 
-    The axis is along the cross product of the normals, through the crossing of the normals' lines seen along it; the
-    radius is the mean of the points' distances from it.
+    The axis is along the cross product of the normals, through the point where the lines of the normals cross in
+    projection along it. The radius is the mean distance of the points from it.
     """
     a0, a1, a2 = normals[i, 0], normals[i, 1], normals[i, 2]
     b0, b1, b2 = normals[j, 0], normals[j, 1], normals[j, 2]
@@ -156,7 +156,7 @@ def _cylinder_through(
 
 @njit(cache=True, nogil=True)
 def _loss(points: FloatArray, model: FloatArray, distance: float, record: float) -> float:
-    """Sum the squared distances to the surface, none counted further than `distance`; stop beyond the record."""
+    """Sum the squared distances to the surface, each limited to `distance`; stop when the sum exceeds the record."""
     loss, most = 0.0, distance * distance
     for i in range(len(points)):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]

@@ -8,15 +8,15 @@ from cylx.optional.open3d import estimate_normals
 
 
 def normals_for(method: str, points: FloatArray, neighbours: int) -> FloatArray:
-    """Fit a plane to the neighbours of each point and give its normal, either way.
+    """Fit a plane to the neighbours of each point and return its normal, up to sign.
 
     Parameters
     ----------
     method : str
-        Who needs them.
+        The method that needs them.
     points : ndarray of shape (N, 3)
     neighbours : int
-        Nearest points of each, itself included, that its plane is fitted to.
+        Nearest points used to fit the plane of a point, the point included.
 
     Returns
     -------
@@ -26,7 +26,7 @@ def normals_for(method: str, points: FloatArray, neighbours: int) -> FloatArray:
     Raises
     ------
     ConfigError
-        If open3d, which estimates them, is not there.
+        If open3d, which estimates them, is not installed.
     """
     try:
         return estimate_normals(points, neighbours)

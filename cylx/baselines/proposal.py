@@ -1,4 +1,4 @@
-"""What a competitor finds: a cylinder, and how many of its own hypotheses speak for it."""
+"""The result of a competitor: a cylinder, and the number of its hypotheses that support it."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from cylx.records import Segment
 
 
 class Proposal(NamedTuple):
-    """A cylinder as a competitor left it, in the frame of the cloud.
+    """A cylinder found by a competitor, in the frame of the cloud.
 
     Parameters
     ----------
     segment : Segment
-        Its height is that of what it was found on.
+        Its height is that of the points or shapes it was found from.
     support : int
-        Hypotheses that led to it: ellipses, seeds, spheres; 1 of sample consensus, where one wins.
+        Hypotheses that led to it: ellipses, seeds, spheres; 1 for sample consensus, where a single one wins.
     """
 
     segment: Segment

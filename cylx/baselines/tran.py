@@ -1,16 +1,17 @@
 """Tran, Cao and Laurendeau: cylinders grown from seeds by their normals, and mean shift over all of them.
 
 After T.-T. Tran, V.-T. Cao and D. Laurendeau, "Extraction of cylinders and estimation of their parameters from point
-clouds", Computers & Graphics 46 (2015), by what the paper says of it: points on curved surface are selected; from the
-neighbourhood of each, the axis comes from the normals, radius and position from a circle fitted to the points projected
-along it; this is repeated, with more inliers each time; what is valid is clustered by mean shift. The paper sets
-alpha = 50, beta = 0.95, ten iterations, and 50 neighbours for the normals (in its tests of outliers 100, and 200 to
-start from).
+clouds", Computers & Graphics 46 (2015), from the paper's description of it: points on curved surface are selected; from
+the neighbourhood of each, the axis comes from the normals, radius and position from a circle fitted to the points
+projected along it; this is repeated, with more inliers each time; valid cylinders are clustered by mean shift. The
+paper sets alpha = 50, beta = 0.95, ten iterations, and 50 neighbours for the normals (in its tests of outliers 100, and
+200 to start from).
 
-Our readings: alpha is the fewest points of a valid cylinder (`min_support`; `min_coverage_deg` takes it for an angle),
-and beta the share of the points near its surface whose normals agree with it. Curved are seeds about which the normals
-spread along one direction rather than two. The neighbourhood grows by half its radius an iteration. Mean shift measures
-angle, offset and radius of two cylinders where the first one is, each over a bandwidth of its own.
+Our readings: alpha is the fewest points of a valid cylinder (`min_support`; `min_coverage_deg` reads it as an angle),
+and beta the share of the points near its surface whose normals agree with it. A seed is on curved surface if the
+normals about it spread along one direction rather than two. The neighbourhood grows by half its radius per iteration.
+Mean shift measures angle, offset and radius of two cylinders at the location of the first one, each with its own
+bandwidth.
 """
 
 from __future__ import annotations
@@ -35,14 +36,14 @@ from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, axis_basis, canonic
 from cylx.records import Frame
 
 DRAWN = 4
-"""Points drawn for each seed that is wanted; those on flat surface are no seeds."""
+"""Points drawn per seed wanted; those on flat surface are not used."""
 GROWTH = 1.5
-"""Factor of the neighbourhood's radius an iteration."""
+"""Factor of the neighbourhood's radius per iteration."""
 ENOUGH_OF_A_NEIGHBOURHOOD = 2000
-"""Points of a neighbourhood that suffice for a fit."""
+"""Maximum number of points of a neighbourhood used for a fit."""
 SHIFTS = 50
 STILL = 1e-4
-"""Bandwidths; a shift shorter than this is the last one."""
+"""In bandwidths; the iteration ends with a shift shorter than this."""
 
 
 class Grown(NamedTuple):
@@ -67,7 +68,7 @@ def find_by_growing(
     rng: np.random.Generator,
     threads: int,
 ) -> Iterator[Proposal]:
-    """Find cylinders as modes of many that were grown from seeds, the one that most of them led to first.
+    """Find cylinders as modes of many grown from seeds, the mode of most of them first.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def find_by_growing(
 
 
 class _Garden:
-    """The oriented points that cylinders grow among.
+    """The oriented points that cylinders are grown on.
 
     Parameters
     ----------
@@ -126,7 +127,7 @@ class _Garden:
         self._tree = cKDTree(frame.points)
 
     def curved_starts(self, drawn: IndexArray) -> list[IndexArray]:
-        """Give the neighbourhoods of those points about which the normals spread along one direction."""
+        """Return the neighbourhoods of those points about which the normals spread along one direction."""
         wanted = min(self._config.start_neighbours, len(self._points))
         starts = []
         for near in self._tree.query(self._points[drawn], k=wanted)[1].reshape(len(drawn), -1):
@@ -138,7 +139,7 @@ class _Garden:
         return starts
 
     def grow(self, start: IndexArray) -> Grown | None:
-        """Fit a cylinder and gather its inliers in turns, and tell whether it is valid."""
+        """Fit a cylinder and collect its inliers in turns; return None if it is not valid."""
         place = self._points[start[0]]
         reach = float(np.linalg.norm(self._points[start] - place, axis=1).max())
         inliers, agreement = start, 0.0
@@ -160,7 +161,7 @@ class _Garden:
         return Grown(model, self._points[inliers[[int(heights.argmin()), int(heights.argmax())]]])
 
     def _fit(self, inliers: IndexArray, place: FloatArray) -> FloatArray | None:
-        """Give the cylinder whose axis is across all normals, and whose circle fits the points seen along it."""
+        """Return the cylinder with its axis across all normals, and with a circle that fits the projected points."""
         normals = self._normals[inliers]
         direction = canonical_direction(np.linalg.eigh(normals.T @ normals)[1][:, 0])
         across = np.column_stack(axis_basis(direction))
@@ -170,7 +171,7 @@ class _Garden:
         return np.concatenate([place + across @ circle[0], direction, [circle[1]]])
 
     def _gather(self, model: FloatArray, place: FloatArray, reach: float) -> tuple[IndexArray, float]:
-        """Give the points near the surface and the seed whose normals agree, and their share of all that are near."""
+        """Return the points near the surface and the seed whose normals agree, and their share of all near points."""
         radius = float(model[RADIUS])
         inner, outer = max(0.0, radius - self._distance), radius + self._distance
         near = self._cells.near_cylinder(model, -reach, reach, inner, outer)
@@ -189,14 +190,14 @@ def shift_to_modes(models: FloatArray, angle: float, length: float) -> list[tupl
     Parameters
     ----------
     models : ndarray of shape (n, 7)
-        Point of the axis, unit direction, radius; the point is where the cylinder is.
+        Point of the axis, unit direction, radius; the point is the location of the cylinder.
     angle, length : float
         Bandwidths: of axis angles, radians; of offsets and radii, in radii.
 
     Returns
     -------
     list of (ndarray of shape (7,), ndarray of int64)
-        Each mode, and the cylinders that lead to it; the mode of most first.
+        Each mode, and the cylinders that lead to it; the mode of most cylinders first.
     """
     modes: list[FloatArray] = []
     members: list[list[int]] = []
@@ -213,7 +214,7 @@ def shift_to_modes(models: FloatArray, angle: float, length: float) -> list[tupl
 
 
 def _shifted(model: FloatArray, models: FloatArray, angle: float, length: float) -> FloatArray:
-    """Move a cylinder to the weighted mean of those about it until it stays."""
+    """Move a cylinder to the weighted mean of those around it until it stays."""
     for _ in range(SHIFTS):
         weights = np.exp(-0.5 * _squared_distances(model, models, angle, length))
         weights /= weights.sum()
@@ -229,7 +230,7 @@ def _shifted(model: FloatArray, models: FloatArray, angle: float, length: float)
 
 
 def _squared_distances(model: FloatArray, models: FloatArray, angle: float, length: float) -> FloatArray:
-    """Give squared distances of cylinders (n, 7) from one, in bandwidths, shape (n,)."""
+    """Return squared distances of cylinders (n, 7) from one, in bandwidths, shape (n,)."""
     cosines = np.clip(np.abs(models[:, DIRECTION] @ model[DIRECTION]), 0.0, 1.0)
     offsets = np.linalg.norm(_feet(model[POINT], models) - model[POINT], axis=1)
     scale = length * model[RADIUS]
@@ -239,6 +240,6 @@ def _squared_distances(model: FloatArray, models: FloatArray, angle: float, leng
 
 
 def _feet(point: FloatArray, models: FloatArray) -> FloatArray:
-    """Give the points nearest to one on the axes of cylinders (n, 7), shape (n, 3)."""
+    """Return the nearest points to a point on the axes of cylinders (n, 7), shape (n, 3)."""
     along = ((point - models[:, POINT]) * models[:, DIRECTION]).sum(axis=1)
     return np.asarray(models[:, POINT] + along[:, None] * models[:, DIRECTION])

@@ -1,6 +1,6 @@
-"""What the user types and sees: one file a command.
+"""The command line: one file per command.
 
-Nothing heavy is imported until a command needs it, so that `cylx --help` costs next to nothing.
+A command imports heavy libraries only when it needs them, so `cylx --help` is fast.
 """
 
 from __future__ import annotations

@@ -39,7 +39,7 @@ def config() -> None:
 def init(*, file: str, preset: str, overwrite: bool) -> None:
     """Write a configuration with every key, its value and its meaning.
 
-    FILE is cylx.yaml if not given, - for standard output. Change what you like, leave out the rest, and give it to
+    FILE is cylx.yaml by default, - for standard output. Change what you like, leave out the rest, and pass it to
     'cylx extract -c FILE'.
     """
     from cylx.config import load_config
@@ -54,9 +54,9 @@ def init(*, file: str, preset: str, overwrite: bool) -> None:
 @json_option
 @debug_option
 def show(*, settings: Config, as_json: bool) -> None:
-    """Show the configuration that these options amount to.
+    """Show the configuration that these options give.
 
-    What is null is read off the cloud; the JSON that 'cylx extract' writes has the values.
+    Values that are null are derived from the cloud; the JSON that 'cylx extract' writes has the derived values.
     """
     from cylx.config import plain_yaml
 
@@ -68,9 +68,9 @@ def show(*, settings: Config, as_json: bool) -> None:
 @json_option
 @debug_option
 def check(*, file: str, as_json: bool) -> None:
-    """Say whether the configuration FILE is valid, and what is wrong with it if not.
+    """Check whether the configuration FILE is valid, and report its faults if not.
 
-    The first fault is told on standard error; the JSON has all that can be seen at once.
+    Standard error shows the first fault; --json lists all faults that can be found at once.
     """
     from cylx.config import load_config
 
@@ -84,13 +84,13 @@ def check(*, file: str, as_json: bool) -> None:
 
 
 def _verdict(file: str, preset: str | None, faults: Sequence[Mapping[str, object]]) -> str:
-    """Say for programs what was found."""
+    """Return the JSON report."""
     content = {"file": legible(file), "valid": not faults, "preset": preset, "faults": faults}
     return json.dumps(content, indent=2, ensure_ascii=False) + "\n"
 
 
 def _faults_of(failure: ConfigError, file: str) -> list[dict[str, object]]:
-    """Give all faults with the dotted path or the line, whichever is known."""
+    """Return all faults with their dotted path or line, if known."""
     place = failure.place.removeprefix(file)
     line, key = re.fullmatch(r":(\d+)", place), re.fullmatch(r"(?:: )?(\w+(?:\.\w+)*)", place)
     known = failure.faults or ((key[1] if key else "", failure.fault, failure.remedy),)
@@ -101,13 +101,13 @@ def _faults_of(failure: ConfigError, file: str) -> list[dict[str, object]]:
 
 
 @config.command(examples=["cylx config schema > cylx.schema.json", "cylx config schema --result"])
-@click.option("--result", is_flag=True, help="The schema of NAME.cylinders.json instead.")
-@click.option("--rejected", is_flag=True, help="The schema of what 'cylx extract --rejected' writes instead.")
+@click.option("--result", is_flag=True, help="Print the schema of NAME.cylinders.json instead.")
+@click.option("--rejected", is_flag=True, help="Print the schema of the file of 'cylx extract --rejected' instead.")
 @debug_option
 def schema(*, result: bool, rejected: bool) -> None:
-    """Print the JSON schema of the configuration, or of the files that are written.
+    """Print the JSON schema of the configuration, or of the output files.
 
-    Editors that know the schema complete and check the YAML while it is written.
+    With the schema, editors complete and check the YAML while you type.
     """
     if result and rejected:
         raise UsageError("--rejected", "contradicts --result", "leave one of them out")

@@ -1,4 +1,4 @@
-"""`cylx diff`: whether two results are the same cylinders."""
+"""`cylx diff`: compare two results."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ _TOLERANCE = click.FloatRange(min=0)
 @click.argument("a", shell_complete=complete_files)
 @click.argument("b", shell_complete=complete_files)
 @click.option(
-    "--angle", "angle_deg", type=_TOLERANCE, default=0.1, show_default=True, help="Between the axes, degrees."
+    "--angle", "angle_deg", type=_TOLERANCE, default=0.1, show_default=True, help="Angle between the axes, degrees."
 )
-@click.option("--offset", type=_TOLERANCE, default=0.01, show_default=True, help="Between the axes, in radii.")
-@click.option("--radius", type=_TOLERANCE, default=0.005, show_default=True, help="Of the radius, relative.")
-@click.option("--height", type=_TOLERANCE, default=0.05, show_default=True, help="Of length and place, relative.")
-@click.option("--inliers", type=_TOLERANCE, default=0.05, show_default=True, help="Of the inliers, relative.")
+@click.option("--offset", type=_TOLERANCE, default=0.01, show_default=True, help="Distance of the axes, in radii.")
+@click.option("--radius", type=_TOLERANCE, default=0.005, show_default=True, help="Radius, relative.")
+@click.option("--height", type=_TOLERANCE, default=0.05, show_default=True, help="Length and position, relative.")
+@click.option("--inliers", type=_TOLERANCE, default=0.05, show_default=True, help="Number of inliers, relative.")
 @json_option
 @debug_option
 def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
-    """Say whether the results A and B are the same cylinders within tolerances.
+    """Compare the cylinders of the results A and B within tolerances.
 
-    The order of the cylinders does not matter. The exit code is 0 if they are the same and 1 if not; what differs is
-    shown.
+    The order of the cylinders does not matter. The exit code is 0 if the results agree and 1 if not; the differences
+    are shown.
     """
     from cylx.cli.terminal.display import show_table
     from cylx.evaluation import Tolerances, compare
@@ -60,7 +60,7 @@ def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
 
 
 def _row(difference: Difference) -> list[str]:
-    """Write one line of the table."""
+    """Format one row of the table."""
     ids = ["" if number is None else str(number) for number in (difference.id_a, difference.id_b)]
     values = (difference.a, difference.b, difference.difference, difference.tolerance)
     return [difference.kind, *ids, difference.what, *("" if v is None else f"{v:.6g}" for v in values)]

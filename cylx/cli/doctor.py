@@ -1,4 +1,4 @@
-"""`cylx doctor`: whether the installation works, by one small check for each thing it needs."""
+"""`cylx doctor`: check the installation, one small check for each thing it needs."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ State = Literal["ok", "missing", "broken"]
 OLDEST = 10
 """Minor version of Python 3."""
 NEEDED = ("click", "numba", "numpy", "plyfile", "pydantic", "PyYAML", "rich", "scipy")
-"""What cylx imports, as it is called on the package index."""
+"""The required packages, by their names on the package index."""
 PACKAGES = {"OCP": ("cadquery-ocp-novtk", "cadquery-ocp")}
-"""Packages that are not called as they are imported."""
+"""Package names of imports that are named differently."""
 TIGHT = 1 << 30
-"""Bytes of memory below which scans of a million points may not fit."""
+"""Bytes of free memory below which scans of a million points may not fit."""
 
 
 @click.command(
@@ -45,10 +45,10 @@ TIGHT = 1 << 30
 @json_option
 @debug_option
 def doctor(*, as_json: bool) -> None:
-    """Check the installation, and say what to do about what is not well.
+    """Check the installation, and say how to repair it.
 
-    Libraries, compiled kernels, memory, and the extraction of a cylinder that is made up. The exit code is 0 if
-    cylinders can be found and 1 if not; optional libraries that are missing are no fault. Nothing is fetched.
+    It checks libraries, compiled kernels, memory, and the extraction of a synthetic cylinder. The exit code is 0 if
+    cylinders can be found and 1 if not; missing optional libraries are no fault. Nothing is downloaded.
     """
     from cylx.cli.terminal.display import Messages, show_table
 
@@ -67,17 +67,17 @@ def doctor(*, as_json: bool) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """What was found of one thing.
+    """The result of one check.
 
     Parameters
     ----------
     name : str
-        The thing.
+        What was checked.
     state : {'ok', 'missing', 'broken'}
     detail : str
-        What there is, or what is wrong.
+        What was found, or what is wrong.
     remedy : str
-        What to do; empty if nothing is needed.
+        How to repair it; empty if nothing is needed.
     needed : bool
         Whether cylinders cannot be found without it.
     """
@@ -90,12 +90,12 @@ class Check:
 
 
 def diagnose(observer: Observer | None = None) -> list[Check]:
-    """Check everything, with a small extraction at the end.
+    """Run all checks, with a small extraction at the end.
 
     Parameters
     ----------
     observer : Observer, optional
-        Told of the progress of the extraction, which compiles the kernels where they are not.
+        Receives the progress of the extraction, which compiles the kernels if necessary.
     """
     return [
         check_python(),
@@ -118,19 +118,19 @@ def check_python() -> Check:
 
 
 def check_package(name: str) -> Check:
-    """Check a package that cylx needs.
+    """Check a required package.
 
     Parameters
     ----------
     name : str
-        As it is called on the package index.
+        Its name on the package index.
     """
     module = {"PyYAML": "yaml"}.get(name, name)
     return _imported(name, lambda: import_module(module), _version(name), f"pip install {name}")
 
 
 def check_open3d() -> Check:
-    """Check open3d, which reads packed PCD files and gives normals to the methods that need them."""
+    """Check open3d, which reads packed PCD files and computes normals for the methods that need them."""
     from cylx.optional.open3d import import_open3d
 
     found = _version("open3d-cpu") or _version("open3d")
@@ -138,9 +138,9 @@ def check_open3d() -> Check:
 
 
 def check_libusb() -> Check:
-    """Check the copy of libusb that open3d is linked with on Linux; elsewhere it brings its own."""
+    """Check the libusb that open3d needs on Linux; on other systems open3d brings its own."""
     if sys.platform != "linux":
-        return Check("libusb", "ok", "open3d brings its own here", needed=False)
+        return Check("libusb", "ok", "included in open3d on this system", needed=False)
     found = _version("libusb-package")
     remedy = "pip install libusb-package, unless open3d works"
     if found is None:
@@ -149,26 +149,26 @@ def check_libusb() -> Check:
 
 
 def check_kernels() -> Check:
-    """Check that the numerical kernels are compiled, and that they can be kept."""
+    """Check that the numerical kernels are compiled, and that the compiled code can be saved."""
     told = os.environ.get("NUMBA_CACHE_DIR")
     source = f"NUMBA_CACHE_DIR={told}" if told else "NUMBA_CACHE_DIR is not set"
-    remedy = "set NUMBA_CACHE_DIR to a folder that can be written to"
+    remedy = "set NUMBA_CACHE_DIR to a writable folder"
     try:
         from cylx.api.warmup import kernel_folder, kernels_are_cold
 
         folder = Path(kernel_folder())
         cold = kernels_are_cold()
-    except (ImportError, OSError, RuntimeError) as error:  # numba finds no folder for them
+    except (ImportError, OSError, RuntimeError) as error:  # numba finds no cache folder
         return Check("kernels", "broken", f"{_first_line(error)}; {source}", remedy)
     if not os.access(folder, os.W_OK):
-        fault = f"cannot be kept: {folder} is read-only; {source}"
-        return Check("kernels", "broken", f"{fault}; every run compiles them anew", remedy, needed=False)
+        fault = f"cannot be saved: {folder} is read-only; {source}"
+        return Check("kernels", "broken", f"{fault}; every run compiles them again", remedy, needed=False)
     state = "were not compiled yet" if cold else "are compiled"
-    return Check("kernels", "ok", f"{state}, and kept in {folder}; {source}")
+    return Check("kernels", "ok", f"{state}, and saved in {folder}; {source}")
 
 
 def check_machine() -> Check:
-    """Check the processor and the memory that is free."""
+    """Check the processor and the free memory."""
     count = f"{cores()} core{'' if cores() == 1 else 's'}"
     free = free_memory()
     if free is None:
@@ -179,7 +179,7 @@ def check_machine() -> Check:
 
 
 def check_extra(name: str) -> Check:
-    """Check a library that does not come with cylx.
+    """Check an optional library.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def check_extra(name: str) -> Check:
 
 
 def check_extraction(observer: Observer | None = None) -> Check:
-    """Check that a cylinder of radius 1 that was made up is found, its radius within 1 %."""
+    """Check that a synthetic cylinder of radius 1 is found, with its radius within 1 %."""
     remedy = "if all else is well, run 'cylx extract --debug' on a scan, and report what it says"
     try:
         from cylx.api import extract
@@ -201,17 +201,17 @@ def check_extraction(observer: Observer | None = None) -> Check:
         from cylx.synthetic import single
 
         found = extract(single(points=2000, seed=1).points, observer=observer or SilentObserver())
-    except Exception as error:  # noqa: BLE001  whatever it is, it is what was asked for
+    except Exception as error:  # noqa: BLE001  any failure is the result of this check
         return Check("extraction", "broken", f"{type(error).__name__}: {_first_line(error)}", remedy)
     radii = [fit.cylinder.radius for fit in found.cylinders]
     if len(radii) != 1 or not math.isclose(radii[0], 1.0, rel_tol=0.01):
         wrong = ", ".join(f"{radius:.4g}" for radius in radii) or "none"
-        return Check("extraction", "broken", f"of one cylinder of radius 1 it finds: {wrong}", remedy)
+        return Check("extraction", "broken", f"for one cylinder of radius 1 it finds: {wrong}", remedy)
     return Check("extraction", "ok", f"finds a cylinder of radius 1 as {radii[0]:.4f}")
 
 
 def extras_there_are() -> set[str]:
-    """Name the extras that the installed cylx has."""
+    """Return the extras of the installed cylx."""
     with suppress(PackageNotFoundError):
         return set(metadata("cylx").get_all("Provides-Extra") or ())
     return {extra for extra, _ in LIBRARIES.values()}
@@ -220,7 +220,7 @@ def extras_there_are() -> set[str]:
 def _imported(
     name: str, load: Callable[[], object], found: str | None, remedy: str, purpose: str = "", *, needed: bool = True
 ) -> Check:
-    """Import something and say how that went."""
+    """Import something and return the result as a check."""
     aim = f", for {purpose}" if purpose else ""
     try:
         load()
@@ -234,17 +234,17 @@ def _imported(
 
 
 def _version(package: str) -> str | None:
-    """Give the version of an installed package."""
+    """Return the version of an installed package."""
     with suppress(PackageNotFoundError):
         return version(package)
     return None
 
 
 def _first_line(error: BaseException) -> str:
-    """Give what an error says, on one line."""
+    """Return the first line of an error's message."""
     return next(iter(_lines(error)), type(error).__name__)
 
 
 def _lines(error: BaseException) -> Iterator[str]:
-    """Give the lines of an error that say something."""
+    """Yield the lines of an error's message that are not empty."""
     return filter(None, map(str.strip, str(error).splitlines()))

@@ -1,4 +1,4 @@
-"""`cylx evaluate`: how right a result is."""
+"""`cylx evaluate`: compare a result with the truth."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ _ERROR = click.FloatRange(min=0)
 )
 @click.argument("result", shell_complete=complete_files)
 @click.argument("truth", shell_complete=complete_files)
-@click.option("--angle", "angle_deg", type=float, default=5.0, show_default=True, help="A match is closer, degrees.")
-@click.option("--offset", type=float, default=0.25, show_default=True, help="A match is closer, in radii.")
-@click.option("--radius", type=float, default=0.15, show_default=True, help="A match is closer, relative radius.")
+@click.option("--angle", "angle_deg", type=float, default=5.0, show_default=True, help="Limit of a match, degrees.")
+@click.option("--offset", type=float, default=0.25, show_default=True, help="Limit of a match, in radii.")
+@click.option("--radius", type=float, default=0.15, show_default=True, help="Limit of a match, relative radius.")
 @click.option("--min-f1", type=_SHARE, metavar="BAR", help="Exit with 1 if F1 is below.")
 @click.option("--min-precision", type=_SHARE, metavar="BAR", help="Exit with 1 if the precision is below.")
 @click.option("--min-recall", type=_SHARE, metavar="BAR", help="Exit with 1 if the recall is below.")
@@ -46,8 +46,8 @@ def evaluate(
 ) -> None:
     """Compare the cylinders of RESULT with those of TRUTH.
 
-    Both are JSON files; 'cylx synth' writes the truth of its scenes. Cylinders are matched one to one where angle,
-    offset and radius are close. Without a bar the exit code is 0 whatever the result.
+    Both are JSON files; 'cylx synth' writes the truth of its scenes. Cylinders are matched one to one if angle, offset
+    and radius are within their limits. Without a BAR option the exit code is 0 whatever the result.
     """
     from cylx import evaluation
     from cylx.io import read_json
@@ -67,12 +67,12 @@ def evaluate(
 
 
 def missed_bars(outcome: Evaluation, bars: Mapping[str, float | None]) -> Iterator[str]:
-    """Name the bars an evaluation does not reach; without any match, errors are not small but unknown.
+    """Yield a message for each bar that is missed; without any match the errors are unknown, which counts as a miss.
 
     Parameters
     ----------
     outcome : Evaluation
-        What was found out.
+        The evaluation.
     bars : mapping of str to float or None
         `min_f1`, `min_precision`, `min_recall`, `max_angle`, `max_offset`, `max_radius_error`.
     """
@@ -88,11 +88,11 @@ def missed_bars(outcome: Evaluation, bars: Mapping[str, float | None]) -> Iterat
         if spread is not None and spread.max > bar:
             yield f"{name} {spread.max:.6g} is above --max-{name} {bar:g}"
         elif spread is None and outcome.truth:
-            yield f"{name} is unknown, nothing was matched, and --max-{name} {bar:g} asks for it"
+            yield f"{name} is unknown, as nothing was matched, and --max-{name} {bar:g} needs it"
 
 
 def as_text(outcome: Evaluation) -> str:
-    """Write an evaluation for reading."""
+    """Format an evaluation as text."""
     counts = (
         f"truth {outcome.truth}, found {outcome.predicted}, matched {outcome.matched}, duplicates {outcome.duplicates},"
         f" ignored {outcome.ignored}"
@@ -115,5 +115,5 @@ def as_text(outcome: Evaluation) -> str:
 
 
 def _statistics(spread: object) -> list[tuple[str, float]]:
-    """Name the statistics of an error."""
+    """Return the statistics of an error with their labels."""
     return [(name, getattr(spread, name)) for name in ("median", "mean", "max")]

@@ -1,4 +1,4 @@
-"""`cylx export`: the cylinders of a result for other programs."""
+"""`cylx export`: write the cylinders of a result for other programs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 @click.argument("result", shell_complete=complete_files)
 @click.argument("outputs", metavar="OUT...", nargs=-1, required=True, shell_complete=complete_files)
 @units_option(".glb, .step, .ifc and .dxf need")
-@click.option("--min-confidence", type=click.FloatRange(0, 1), metavar="X", help="Leave out what is less sure.")
+@click.option("--min-confidence", type=click.FloatRange(0, 1), metavar="X", help="Leave out less certain cylinders.")
 @overwrite_option
 @json_option
 @debug_option
@@ -49,8 +49,8 @@ def export(
 ) -> None:
     """Write the cylinders of RESULT for other programs.
 
-    The suffix of each OUT says how: .ply, .obj, .glb and .stl are meshes, .csv is a table, .step and .stp are exact
-    solids, .ifc has pipe segments, and .dxf centre lines. All but the table need an extra, such as 'cylx[mesh]'.
+    The suffix of each OUT selects the format: .ply, .obj, .glb and .stl are meshes, .csv is a table, .step and .stp are
+    exact solids, .ifc has pipe segments, and .dxf centre lines. All but the table need an extra, such as 'cylx[mesh]'.
     """
     from cylx.export import format_of, render
     from cylx.io import check_writable
@@ -69,7 +69,7 @@ def export(
 
 
 def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[str, Any]:
-    """Say what was written, for programs."""
+    """Return the JSON report of the files written."""
     return {
         "result": legible(result),
         "cylinders": len(drawing.cylinders),
@@ -83,7 +83,7 @@ def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[s
 
 
 def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing:
-    """Read a result and choose what is drawn."""
+    """Read a result and choose the cylinders to draw."""
     from cylx.io import read_json
     from cylx.results import Result
 
@@ -93,14 +93,14 @@ def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing
 
 
 def _sure(path: str, cylinders: Sequence[ResultCylinder], least: float) -> list[ResultCylinder]:
-    """Choose the cylinders that are sure enough."""
+    """Return the cylinders with at least this confidence."""
     if any(cylinder.confidence is None for cylinder in cylinders):
         raise InputError(path, "its cylinders have no confidence", "leave --min-confidence out")
     return [cylinder for cylinder in cylinders if cylinder.confidence is not None and cylinder.confidence >= least]
 
 
 def _report(path: str, drawing: Drawing, written: dict[str, Exported]) -> None:
-    """Say what was written where, and what its reader has to know."""
+    """Report the files written, with remarks for their reader."""
     count = len(drawing.cylinders)
     tell(f"{path}: {count} cylinder{'' if count == 1 else 's'}, written to {', '.join(written)}")
     for remark in remarks_on(drawing, written):

@@ -1,4 +1,4 @@
-"""`cylx extract`: a cloud in, cylinders out."""
+"""`cylx extract`: find the cylinders of scans."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     "--output",
     metavar="FILE",
     shell_complete=complete_files,
-    help="The JSON; - for standard output, as --json elsewhere, or a folder.  [default: beside the scan]",
+    help="Name of the JSON; - for standard output (--json in other commands), or a folder.  [default: beside the scan]",
 )
 @click.option(
     "--annotate/--no-annotate",
@@ -43,19 +43,19 @@ if TYPE_CHECKING:
     "--annotated",
     metavar="FILE",
     shell_complete=complete_files,
-    help="Name of the annotated cloud: PLY, or .pcd, or of a LAS or LAZ scan .las or .laz.  [default: beside the JSON]",
+    help="Name of the annotated cloud: .ply, .pcd, or for LAS and LAZ scans .las or .laz.  [default: beside the JSON]",
 )
 @click.option(
     "--rejected",
     metavar="FILE",
     shell_complete=complete_files,
-    help="Write what was not accepted, and why, as JSON; - for standard output, or a folder.",
+    help="Write the rejected fits and the reasons as JSON; - for standard output, or a folder.",
 )
 @click.option(
     "--report",
     metavar="FILE",
     shell_complete=complete_files,
-    help="Write a page for the browser: the cloud and its cylinders in 3-D; - for standard output, or a folder.",
+    help="Write an HTML page with the cloud and its cylinders in 3-D; - for standard output, or a folder.",
 )
 @click.option(
     "--png",
@@ -72,7 +72,7 @@ if TYPE_CHECKING:
 @units_option("a mesh that is .glb needs")
 @configured
 @selecting
-@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one a core]")
+@click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one per core]")
 @click.option(
     "--require", type=click.IntRange(min=1), metavar="N", help="Exit with 5 if fewer cylinders are found; still write."
 )
@@ -110,8 +110,8 @@ def extract(
 
     SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, a folder of them, a pattern in quotes, or - for standard input.
     For scan.ply this writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of
-    each point; with --report FILE a page to look at, too. Nothing has to be tuned: spacing, noise and radii are read
-    off the cloud, in whatever unit it comes. A table of what was found goes to standard error.
+    each point; --report FILE adds a page for the browser. No tuning is needed: spacing, noise and radii are measured in
+    the cloud, whatever its unit. A table of the cylinders goes to standard error.
     """
     from cylx.cli.batch.batch import Batch
     from cylx.cli.batch.run import Run
@@ -141,7 +141,7 @@ def extract(
 
 
 def write_profile(path: str, batch: Batch, *, overwrite: bool) -> None:
-    """Write the times of all scans that were finished."""
+    """Write the times of all finished scans."""
     from cylx.io import write_text
     from cylx.version import __version__
 

@@ -1,4 +1,4 @@
-"""`cylx info`: what is in a file."""
+"""`cylx info`: describe a scan."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 @json_option
 @debug_option
 def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
-    """Show what is in a scan, which cylinders can be found in it, and what will go wrong.
+    """Show the contents of a scan, the radii that can be found in it, and likely problems.
 
-    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, or - for standard input. Spacing and noise are measured as
-    'cylx extract' does, in the unit of the scan; the radii that it looks for and the memory that it takes follow. If
-    only some points take part, all that is theirs. What will go wrong is said in a line each on standard error.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, or - for standard input. Spacing and noise are measured as 'cylx
+    extract' does, in the unit of the scan; the range of radii and the memory needed follow from them. If only some
+    points are used, all values are for these points. Standard error shows one line for each likely problem.
     """
     from cylx.io import read_cloud
     from cylx.scene import select
@@ -47,7 +47,7 @@ def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
     except InputError as failure:
         from cylx.scene.cautions import Caution
 
-        found = [Caution("unusable", failure.fault, "cylinders cannot be looked for in it")]
+        found = [Caution("unusable", failure.fault, "no cylinders can be found in it")]
     found += _scarce_memory(facts["extract_memory_bytes"])
     facts["warnings"] = [asdict(caution) for caution in found]
     for caution in found:
@@ -56,16 +56,16 @@ def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
 
 
 def look_ahead(whole: PointCloud, cloud: PointCloud, seed: int) -> tuple[dict[str, Any], list[Caution]]:
-    """Measure the scale of a cloud, and say what it means for its cylinders.
+    """Measure the scale of a cloud, and derive the range of radii and likely problems.
 
     Parameters
     ----------
     whole : PointCloud
         As it was read.
     cloud : PointCloud
-        The points of it that take part.
+        The points that are used.
     seed : int
-        Of the measurement.
+        Seed of the measurement.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def look_ahead(whole: PointCloud, cloud: PointCloud, seed: int) -> tuple[dict[st
     Raises
     ------
     InputError
-        If no cylinder could be told from anything else in it.
+        If the cloud is unusable for finding cylinders.
     """
     from cylx.config import load_config
     from cylx.scene import check_usable, measure_scene, resolve, thinnest
@@ -94,18 +94,18 @@ def look_ahead(whole: PointCloud, cloud: PointCloud, seed: int) -> tuple[dict[st
 
 
 def _scarce_memory(needed: int) -> list[Caution]:
-    """Notice that the extraction may not fit into the memory that is free now."""
+    """Return a caution if the extraction may not fit into the free memory."""
     from cylx.scene.cautions import Caution
 
     available = free_memory()
     if available is None or needed <= available:
         return []
-    fault = f"'cylx extract' takes about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free"
+    fault = f"'cylx extract' needs about {needed / 1e9:.2g} GB, and {available / 1e9:.2g} GB are free"
     return [Caution("memory", fault, "take a part of the scan by --crop or --voxel")]
 
 
 def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
-    """Give what a file says of itself as a JSON object; bounds and extent are those of the points that take part."""
+    """Return the facts about a file as a JSON object; bounds and extent are those of the points that are used."""
     table = whole.table
     names = ("x", "y", "z") if table is None or table.dtype.names is None else table.dtype.names
     fields = [{"name": n, "type": "float64" if table is None else str(table.dtype[n])} for n in names]
@@ -129,7 +129,7 @@ def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
 
 
 def as_text(facts: dict[str, Any]) -> str:
-    """Write the facts for reading."""
+    """Format the facts as text."""
     lines = {
         "file": facts["file"],
         "format": facts["format"],
@@ -146,11 +146,11 @@ def as_text(facts: dict[str, Any]) -> str:
         lines["spacing"] = f"{facts['scene']['spacing']:.4g}"
         lines["noise"] = f"{facts['scene']['noise']:.4g}"
         radius = facts["radius"]
-        lines["radii"] = f"{radius['min']:.4g} to {radius['max']:.4g}, found as a rule from {radius['found_from']:.4g}"
+        lines["radii"] = f"{radius['min']:.4g} to {radius['max']:.4g}, usually found from {radius['found_from']:.4g}"
     lines["memory"] = f"{facts['extract_memory_bytes'] / 1e9:.2g} GB for cylx extract"
     return "".join(f"{name:<8} {value}\n" for name, value in lines.items())
 
 
 def _vector(values: list[float]) -> str:
-    """Write three coordinates."""
+    """Format three coordinates."""
     return " ".join(f"{value:.10g}" for value in values)

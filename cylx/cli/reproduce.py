@@ -1,4 +1,4 @@
-"""`cylx reproduce`: the paper's experiments, run again."""
+"""`cylx reproduce`: run the paper's experiments again."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ SAVED_EVERY = 5.0
 )
 @click.argument("figures", metavar="FIGURE...", nargs=-1, required=True, type=click.Choice((*NUMBERS, "all")))
 @click.option(
-    "--trials", type=click.IntRange(min=1), metavar="N", default=100, show_default=True, help="Of each setting."
+    "--trials", type=click.IntRange(min=1), metavar="N", default=100, show_default=True, help="Trials per setting."
 )
-@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use.  [default: one a core]")
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Processes to use.  [default: one per core]")
 @click.option(
     "--curves",
     metavar="NAMES",
@@ -46,7 +46,7 @@ SAVED_EVERY = 5.0
     default="experiments",
     show_default=True,
     shell_complete=complete_files,
-    help="Where the tables and pictures go; trials that are there already are not run again.",
+    help="Folder for the tables and pictures; trials already in it are not run again.",
 )
 @click.option(
     "--data",
@@ -70,9 +70,9 @@ def reproduce(
 ) -> None:
     """Run the paper's experiments again.
 
-    FIGURE is a number from 5 to 12, or all. For each this writes figure-N.csv, a line a trial, and figure-N.png, and
-    a table of means goes to standard output, with --json all figures at the end. What is interrupted goes on where it
-    was. Times are those of this machine, of one thread in each of --jobs processes.
+    FIGURE is a number from 5 to 12, or all. Each figure writes figure-N.csv, with a line per trial, and figure-N.png. A
+    table of means goes to standard output; with --json all figures are printed at the end. An interrupted run can be
+    continued by the same command. Times are those of this machine, with one thread in each of --jobs processes.
     """
     from cylx.experiments import FIGURES
     from cylx.io import read_object
@@ -101,21 +101,21 @@ def reproduce(
 
 
 class Study:
-    """Figures that are run into a folder.
+    """The figures of one call, and the folder for their files.
 
     Parameters
     ----------
     folder : Path
     trials : int
-        Of each setting.
+        Trials per setting.
     jobs : int
-        Processes.
+        Number of processes.
     messages : Messages
 
     Raises
     ------
     OutputError
-        If the folder cannot be made.
+        If the folder cannot be created.
     """
 
     def __init__(self, folder: Path, trials: int, jobs: int, messages: Messages) -> None:
@@ -126,16 +126,16 @@ class Study:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            fault = f"cannot be made: {(error.strerror or str(error)).lower()}"
+            fault = f"cannot be created: {(error.strerror or str(error)).lower()}"
             raise OutputError(str(folder), fault, "give another folder by --out") from None
 
     def run(self, figure: Figure, scan: ObjectScan | None) -> list[Summary]:
-        """Run what is missing of a figure, draw it, and give its means.
+        """Run the missing trials of a figure, draw it, and return its means.
 
         Raises
         ------
         OutputError
-            If its files cannot be written, or are something else.
+            If its files cannot be written, or existing files are something else.
         UsageError
             If matplotlib is not installed.
         """
@@ -147,7 +147,7 @@ class Study:
         check_writable(picture, overwrite=True)
         made_by = __version__ if scan is None else f"{__version__} {scan.name}"
         done = self._read(table, made_by)
-        draw(figure, summarize(figure, done), done)  # what is needed for the picture is there
+        draw(figure, summarize(figure, done), done)  # fails now if matplotlib is missing
         tasks = tasks_of(figure, self.trials, done)
         with self.messages.progress() as observer, observed(observer, f"figure {figure.number}", len(tasks)):
             saved = monotonic()
@@ -167,7 +167,7 @@ class Study:
         return summaries
 
     def _read(self, table: Path, made_by: str) -> Trials:
-        """Read the trials that are done."""
+        """Read the finished trials."""
         from cylx.experiments import parse_trials
         from cylx.io import check_writable
 
@@ -179,7 +179,7 @@ class Study:
         except (OSError, UnicodeDecodeError):
             trials = None
         if trials is None:
-            raise OutputError(str(table), "is there, and is no table of trials", "give another folder by --out")
+            raise OutputError(str(table), "exists and is not a table of trials", "give another folder by --out")
         return trials
 
     def _write(self, table: Path, trials: Trials, made_by: str) -> None:
@@ -191,7 +191,7 @@ class Study:
 
 
 def _only(figures: list[Figure], curves: str | None) -> list[Figure]:
-    """Leave the cells of some methods, and the figures that have them."""
+    """Keep only the cells of some methods, and the figures that have them."""
     if curves is None:
         return figures
     from cylx.experiments.figures import CURVES
@@ -199,7 +199,7 @@ def _only(figures: list[Figure], curves: str | None) -> list[Figure]:
     names = [name.strip() for name in curves.split(",")]
     for name in names:
         if name not in CURVES:
-            raise UsageError(f"--curves {curves}", f"'{name}' is no method", f"the methods are {', '.join(CURVES)}")
+            raise UsageError(f"--curves {curves}", f"'{name}' is not a method", f"the methods are {', '.join(CURVES)}")
     cut = [figure._replace(cells=tuple(cell for cell in figure.cells if cell.method in names)) for figure in figures]
     left = [figure for figure in cut if figure.cells]
     if not left:
@@ -209,7 +209,7 @@ def _only(figures: list[Figure], curves: str | None) -> list[Figure]:
 
 
 def _told(summary: Summary) -> dict[str, object]:
-    """Write down the means of a cell; what is not known is null."""
+    """Return the means of a cell as a JSON object; unknown values are null."""
     names, cell = ("angle_deg", "offset_radii", "radius_percent", "seconds"), summary.cell
     known = {name: (mean, error) for name, mean, error in zip(names, summary.means, summary.errors, strict=True)}
     bound = dict(zip(names, summary.bound or (), strict=False))
@@ -230,7 +230,7 @@ def _number(value: float) -> float | None:
 
 
 def _show(figure: Figure, summaries: list[Summary]) -> None:
-    """Show the means, and how many times the bound they are."""
+    """Show the means, and their ratios to the bound."""
     from cylx.cli.terminal.display import show_table
 
     errors = figure.kind in {"cylinder", "cans"}

@@ -1,4 +1,4 @@
-"""`cylx synth`: clouds whose cylinders are known."""
+"""`cylx synth`: make clouds whose cylinders are known."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def output_options(command: Command) -> Command:
-    """Add what both scenes have in common: where it lies, and how it is written."""
+    """Add the options of both scenes: position, scale and file format."""
     command = debug_option(json_option(overwrite_option(command)))
     for option in _OUTPUT:
         command = option(command)
@@ -44,13 +44,11 @@ _OUTPUT: tuple[Callable[[Any], Any], ...] = (
         type=click.Choice(["double", "single"]),
         default="double",
         show_default=True,
-        help="Of the coordinates in the file.",
+        help="Precision of the coordinates in the file.",
     ),
     click.option("--offset", type=Vector(), default="0,0,0", help="Move the scene, in its unit after --scale."),
-    click.option("--scale", type=float, default=1.0, show_default=True, help="Enlarge the scene by a factor."),
-    click.option(
-        "--seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Seed of all chance."
-    ),
+    click.option("--scale", type=float, default=1.0, show_default=True, help="Scale the scene by this factor."),
+    click.option("--seed", type=click.IntRange(min=0), metavar="N", default=0, show_default=True, help="Random seed."),
 )
 
 
@@ -58,7 +56,7 @@ _OUTPUT: tuple[Callable[[Any], Any], ...] = (
 def synth() -> None:
     """Make a cloud whose cylinders are known.
 
-    Beside the cloud, NAME.truth.json says where its cylinders are; 'cylx evaluate' compares a result with it.
+    NAME.truth.json, beside the cloud, lists its cylinders; 'cylx evaluate' compares a result with it.
     """
 
 
@@ -67,9 +65,9 @@ def synth() -> None:
 @click.option("--points", type=int, default=10000, show_default=True, help="Number of points.")
 @click.option("--height", type=float, default=4.0, show_default=True, help="Height of the cylinder, in radii.")
 @click.option("--sigma", type=float, default=0.01, show_default=True, help="Noise of a point, in radii.")
-@click.option("--p", type=float, default=0.0, show_default=True, help="Probability of a point to be an outlier.")
+@click.option("--p", type=float, default=0.0, show_default=True, help="Probability that a point is an outlier.")
 @click.option("--sigma-o", type=float, default=0.04, show_default=True, help="Noise of an outlier, in radii.")
-@click.option("--theta", "theta_deg", type=float, default=360.0, show_default=True, help="Angle seen, degrees.")
+@click.option("--theta", "theta_deg", type=float, default=360.0, show_default=True, help="Visible angle, degrees.")
 @output_options
 def single(
     *,
@@ -96,7 +94,7 @@ def single(
 @click.argument("out", shell_complete=complete_files)
 @click.option("--points", type=int, default=100000, show_default=True, help="Number of points.")
 @click.option("--cylinders", type=int, default=5, show_default=True, help="Number of cylinders.")
-@click.option("--planes", type=int, default=1, show_default=True, help="Floor, four walls and ceiling: 0 to 6 of them.")
+@click.option("--planes", type=int, default=1, show_default=True, help="Number of floor, walls, ceiling: 0 to 6.")
 @click.option("--boxes", type=int, default=2, show_default=True, help="Number of boxes.")
 @click.option("--spheres", type=int, default=2, show_default=True, help="Number of spheres.")
 @click.option("--cones", type=int, default=1, show_default=True, help="Number of cones.")
@@ -104,7 +102,7 @@ def single(
 @click.option("--sigma", type=float, default=0.002, show_default=True, help="Noise of points on surfaces.")
 @click.option("--radius", type=RadiusRange(), default="0.04:0.16", show_default=True, help="Radii of the cylinders.")
 @click.option(
-    "--coverage", "coverage_min_deg", type=float, default=150.0, show_default=True, help="Least angle seen, degrees."
+    "--coverage", "coverage_min_deg", type=float, default=150.0, show_default=True, help="Least visible angle, degrees."
 )
 @click.option("--room", type=float, help="Width of the room.  [default: as wide as the objects need]")
 @output_options
@@ -119,9 +117,9 @@ def multi(
     radius: Bounds,
     **parameters: Any,  # noqa: ANN401  the options of the scene, of many types
 ) -> None:
-    """Make a room with cylinders, and with planes, boxes, spheres, cones and noise.
+    """Make a room with cylinders, planes, boxes, spheres, cones and noise.
 
-    OUT ends in .ply, .pcd or .xyz. The unit is the metre, say; --scale 1000 turns it into millimetres.
+    OUT ends in .ply, .pcd or .xyz. Take the unit as metres; --scale 1000 turns them into millimetres.
     """
     from cylx import synthetic
 
@@ -134,12 +132,12 @@ def multi(
 
 
 def truth_path(out: str) -> str:
-    """Name the truth that belongs to a cloud."""
+    """Return the name of the truth file of a cloud."""
     return str(Path(out).with_name(Path(out).stem + TRUTH))
 
 
 def prepare(out: str, *, overwrite: bool) -> None:
-    """Refuse outputs that could not be written, before anything is made."""
+    """Refuse outputs that cannot be written, before anything is computed."""
     from cylx.io import check_writable
 
     check_apart([], [out, truth_path(out)])
@@ -148,7 +146,7 @@ def prepare(out: str, *, overwrite: bool) -> None:
 
 
 def write_scene(out: str, scene: SyntheticScene, *, precision: str, overwrite: bool, as_json: bool) -> None:
-    """Write a scene and its truth, and for programs say what was written."""
+    """Write a scene and its truth, and print a JSON report if requested."""
     from cylx.io import write_cloud, write_text
 
     dtype: Literal["f4", "f8"] = "f4" if precision == "single" else "f8"

@@ -1,4 +1,4 @@
-"""`cylx view`: a result in a window."""
+"""`cylx view`: show a result in a window."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ _REMEDY = "write a page instead, by cylx extract --report"
     "--cloud",
     metavar="FILE",
     shell_complete=complete_files,
-    help="The annotated cloud, or any other.  [default: the annotated cloud beside the result]",
+    help="The annotated cloud, or another cloud.  [default: the annotated cloud beside the result]",
 )
 @debug_option
 def view(*, result: str, cloud: str | None) -> None:
-    """Show RESULT in a window: the cloud by cylinder, and the cylinders.
+    """Show the cylinders of RESULT and the cloud, coloured by cylinder, in a window.
 
-    RESULT is a JSON file of 'cylx extract'. Drag to turn, wheel to zoom, Q to close. Without a display this is refused;
-    'cylx extract --report' writes a page that any browser shows.
+    RESULT is a JSON file of 'cylx extract'. Drag to turn, wheel to zoom, Q to close. The window needs a display;
+    without one, 'cylx extract --report' writes a page for any browser.
     """
     from cylx.io import read_cloud, read_json
     from cylx.optional.open3d import NoDisplayError, show_scene
@@ -60,7 +60,7 @@ def view(*, result: str, cloud: str | None) -> None:
 
 
 def beside(result: str) -> str:
-    """Name the annotated cloud that was written with a result.
+    """Return the name of the annotated cloud that was written with a result.
 
     Raises
     ------
@@ -78,13 +78,13 @@ def beside(result: str) -> str:
 
 
 def point_colors(cloud: PointCloud, cylinders: int) -> NDArray[np.uint8]:
-    """Give the points of an annotated cloud the colours of their cylinders; those of any other cloud are grey.
+    """Return the colours of the points of an annotated cloud by cylinder; points of any other cloud are grey.
 
     Parameters
     ----------
     cloud : PointCloud
     cylinders : int
-        Number of cylinders; other ids are none.
+        Number of cylinders; other ids count as no cylinder.
 
     Returns
     -------

@@ -1,6 +1,6 @@
-"""The configuration: the YAML file mirrored, put together from presets, files, overrides and options.
+"""The configuration: a mirror of the YAML file, built from presets, files, overrides and options.
 
-The names are resolved when they are first used: what needs one file of the room does not wait for the others.
+Names are imported on first use, so that using one file does not import the others.
 """
 
 from __future__ import annotations

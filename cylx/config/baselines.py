@@ -1,4 +1,4 @@
-"""The sections of the configuration of the four methods the paper compares itself with; see `cylx.baselines`."""
+"""The configuration sections of the four methods that the paper compares itself with; see `cylx.baselines`."""
 
 from __future__ import annotations
 
@@ -12,67 +12,67 @@ Angle = Annotated[Number, Field(gt=0, lt=90)]
 
 
 class MsacConfig(Section):
-    """Sample consensus with normals; used by `method: msac` alone."""
+    """Sample consensus with normals; used by `method: msac` only."""
 
     neighbours: Annotated[int, Field(ge=3)] = 50
-    """Points a normal is fitted to. More points smooth the noise, and round off thin pipes."""
+    """Points used to fit a normal. More points smooth the noise, and round off thin pipes."""
     iterations: Annotated[int, Field(ge=1)] = 5000
     """Pairs of points tried for each cylinder."""
     distance: Positive | None = None
     """Distance from the surface up to which a point supports a cylinder, scene units; null is three noises."""
     refine: bool = False
-    """Fit the best cylinder to its support by least squares; the paper says nothing of it."""
+    """Fit the best cylinder to its support by least squares; the paper does not mention it."""
     removal: Annotated[Number, Field(gt=0, lt=1)] = 0.05
-    """Points so near to the surface of a cylinder that was found, in radii, take no further part."""
+    """Points this close to the surface of an accepted cylinder, in radii, are removed from the search."""
     min_share: Share = 0.01
-    """A cylinder supported by a smaller share of all points ends the search; the paper knows the number beforehand."""
+    """A cylinder supported by a smaller share of all points ends the search; the paper assumes a known number."""
 
 
 class LineFitConfig(Section):
-    """A line through the centres of ellipses; used by `method: line-fit` alone, for clouds of one cylinder."""
+    """A line through the centres of ellipses; used by `method: line-fit` only, for clouds of one cylinder."""
 
     refine: bool = True
-    """Fit the cylinder to the points by least squares at the end."""
+    """Finally fit the cylinder to the points by least squares."""
     reach: Annotated[Number, Field(gt=0, lt=1)] = 0.5
-    """That fit takes the points so near to the surface, in radii."""
+    """The final fit uses the points this close to the surface, in radii."""
 
 
 class TranConfig(Section):
-    """Growing from seeds with normals, and mean shift; used by `method: tran` alone."""
+    """Growing from seeds with normals, and mean shift; used by `method: tran` only."""
 
     neighbours: Annotated[int, Field(ge=3)] = 50
-    """Points a normal is fitted to."""
+    """Points used to fit a normal."""
     start_neighbours: Annotated[int, Field(ge=6)] = 50
-    """Points a cylinder starts from."""
+    """Points used to fit the first cylinder of a seed."""
     seeds: Annotated[int, Field(ge=1)] = 100
-    """Points that cylinders are grown from."""
+    """Points from which cylinders are grown."""
     iterations: Annotated[int, Field(ge=1)] = 10
-    """Times a cylinder is fitted and its support gathered anew."""
+    """Number of times a cylinder is fitted and its support collected again."""
     min_curvature: Annotated[Number, Field(ge=1)] = 2.0
     """Least ratio of the two largest spreads (variances) of the normals about a seed: a plane has 1."""
     distance: Positive | None = None
     """Distance from the surface up to which a point supports a cylinder, scene units; null is three noises."""
     normal_angle_deg: Angle = 20.0
-    """Angle of a normal to the radial direction up to which its point supports a cylinder, degrees."""
+    """Angle between normal and radial direction up to which a point supports a cylinder, degrees."""
     min_support: Annotated[int, Field(ge=6)] = 50
-    """alpha as we read it: fewest points of a valid cylinder."""
+    """alpha in our reading: fewest points of a valid cylinder."""
     min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 0.0
-    """alpha as it may be read, too: the angle about its axis that a valid cylinder covers, degrees."""
+    """alpha in another reading: the angle about its axis that a valid cylinder covers, degrees."""
     min_agreement: Share = 0.95
-    """beta as we read it: share of the points within `distance` of a valid cylinder whose normals agree with it."""
+    """beta in our reading: share of the points within `distance` of a valid cylinder whose normals agree with it."""
     bandwidth_deg: Angle = 5.0
-    """Mean shift: the angle of axes that counts as one bandwidth, degrees."""
+    """Mean shift: bandwidth of the angle between axes, degrees."""
     bandwidth: Positive = 0.1
-    """Mean shift: the offset of axes, and the difference of radii, that counts as one bandwidth, in radii."""
+    """Mean shift: bandwidth of the offset of axes and of the difference of radii, in radii."""
     min_share: Share = 0.05
     """A mode of mean shift with a smaller share of the valid cylinders is dropped."""
 
 
 class JinConfig(Section):
-    """Spheres that roll within a pipe; used by `method: jin` alone."""
+    """Spheres that roll within a pipe; used by `method: jin` only."""
 
     seeds: Annotated[int, Field(ge=1)] = 400
-    """Neighbourhoods that a sphere is looked for in."""
+    """Neighbourhoods in which a sphere is searched."""
     neighbourhood: Positive | None = None
     """Radius of a neighbourhood, scene units; null tries many, from 6 spacings to a quarter of the extent."""
     iterations: Annotated[int, Field(ge=1)] = 200
@@ -82,10 +82,10 @@ class JinConfig(Section):
     min_share: Share = 0.15
     """A sphere supported by a smaller share of its neighbourhood is dropped."""
     min_linearity: Share = 0.7
-    """Share of the largest variance of the centres about a centre, from which the pipe is straight there."""
+    """Share of the largest variance of the centres about a centre above which the pipe is straight there."""
     line_distance: Positive = 0.2
-    """Distance from a line up to which a centre belongs to it, in radii; its own radius may differ as much."""
+    """Distance from a line up to which a centre belongs to it, in radii; also the limit for the difference of radii."""
     line_iterations: Annotated[int, Field(ge=1)] = 500
     """Lines through two centres tried for each cylinder."""
     min_spheres: Annotated[int, Field(ge=3)] = 10
-    """A line with fewer centres is no cylinder."""
+    """A line with fewer centres is not a cylinder."""

@@ -28,7 +28,7 @@ Given = Sequence[Mapping[str, object] | CatalogueEntry | float]
 
 
 class _Table(NamedTuple):
-    """What the header line of a table says.
+    """The contents of the header line of a table.
 
     Parameters
     ----------
@@ -43,9 +43,9 @@ class _Table(NamedTuple):
 def read_catalogue(path: str | PathLike[str]) -> list[dict[str, object]]:
     """Read the nominal radii of a file.
 
-    A table has a header line that names its columns: `radius` or `diameter`, and, if wanted, `tolerance` (of a
-    diameter, if that is what is given) and `name`. They are set apart by commas, semicolons or tabs. A file whose name
-    ends in `.yaml` or `.yml` has a list of entries, as `scene.catalogue` has.
+    A table has a header line that names its columns: `radius` or `diameter`, and optionally `tolerance` (of the
+    diameter, if that is given) and `name`. Columns are separated by commas, semicolons or tabs. A file whose name ends
+    in `.yaml` or `.yml` has a list of entries, as `scene.catalogue` has.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def read_catalogue(path: str | PathLike[str]) -> list[dict[str, object]]:
     Raises
     ------
     ConfigError
-        If the file cannot be read, or anything in it cannot be meant; in one line, with the number of the line.
+        If the file cannot be read or has an invalid entry; the message is one line and names the line of the file.
     """
     place = str(path)
     text = _text_of(Path(path), place)
@@ -78,9 +78,9 @@ def read_catalogue(path: str | PathLike[str]) -> list[dict[str, object]]:
 
 
 def entries_of(given: Given | str | PathLike[str]) -> object:
-    """Give a catalogue as the configuration has it, whichever way it was given: in a file, as entries, or as radii.
+    """Return a catalogue in the form of the configuration, from a file, from entries, or from radii.
 
-    What is none of these is left for the validation to name.
+    Any other value is returned as it is, and the validation reports it.
     """
     if isinstance(given, str | PathLike):
         return read_catalogue(given)
@@ -88,7 +88,7 @@ def entries_of(given: Given | str | PathLike[str]) -> object:
 
 
 def _plain_entry(entry: object) -> object:
-    """Give one entry as a mapping; numpy's numbers are not those of YAML."""
+    """Return one entry as a mapping; numpy numbers become Python numbers."""
     if isinstance(entry, CatalogueEntry):
         return entry.model_dump()
     if isinstance(entry, Mapping):
@@ -118,20 +118,20 @@ def _text_of(path: Path, place: str) -> str:
 
 
 def _entries_of_yaml(text: str, place: str) -> Iterator[tuple[int, dict[str, object]]]:
-    """Give each entry of a YAML list with its line."""
+    """Yield each entry of a YAML list with its line."""
     entries = parse_yaml(text, place)
     if entries is None:
         return
     if not isinstance(entries, list):
-        raise ConfigError(place, "is no list of entries", "write '- {name: DN50, radius: 0.03015}' for each of them")
+        raise ConfigError(place, "is not a list of entries", "write '- {name: DN50, radius: 0.03015}' for each of them")
     for line, entry in zip(entry_lines(text), entries, strict=True):
         if not isinstance(entry, dict):
-            raise ConfigError(f"{place}:{line}", "is no entry", "write '- {name: DN50, radius: 0.03015}'")
+            raise ConfigError(f"{place}:{line}", "is not an entry", "write '- {name: DN50, radius: 0.03015}'")
         yield line, entry
 
 
 def _entries_of_table(text: str, place: str) -> Iterator[tuple[int, dict[str, object]]]:
-    """Give each entry of a table with its line; `#` at the beginning of a line makes it a comment."""
+    """Yield each entry of a table with its line number; lines that begin with `#` are comments."""
     table = None
     for number, line in enumerate(text.split("\n"), 1):
         if not line.strip() or line.lstrip().startswith("#"):
@@ -145,11 +145,11 @@ def _entries_of_table(text: str, place: str) -> Iterator[tuple[int, dict[str, ob
 
 
 def _header_of(line: str, place: str) -> _Table:
-    """Read the line that names the columns."""
+    """Read the header line."""
     separator = next((mark for mark in _SEPARATORS if mark in line), ",")
     columns = [cell.lower() for cell in _cells_of(line, separator, place)]
     if any(_NUMBER.fullmatch(column) for column in columns):
-        raise ConfigError(place, "is no header line", f"begin with a line that names the columns, {_EXAMPLE}")
+        raise ConfigError(place, "is not a header line", f"begin with a line that names the columns, {_EXAMPLE}")
     for column in columns:
         if column not in _COLUMNS:
             close = get_close_matches(column, _COLUMNS, n=1)
@@ -182,7 +182,7 @@ def _entry_of(line: str, table: _Table, place: str) -> dict[str, object]:
 
 
 def _cells_of(line: str, separator: str, place: str) -> list[str]:
-    """Split a line into its cells, which may stand in quotes."""
+    """Split a line into its cells, which may be quoted."""
     try:
         (row,) = csv.reader([line], delimiter=separator, skipinitialspace=True, strict=True)
     except csv.Error as error:
@@ -202,13 +202,13 @@ def _number(cell: str, column: str, place: str) -> float:
 
 
 def _shown(cell: str) -> str:
-    """Show a cell, shortened, without what a terminal could take for a command."""
+    """Return a cell shortened, and without control characters for the terminal."""
     text = repr(cell)
     return text if len(text) <= 40 else f"{text[:36]} ..."
 
 
 def _validate(entry: dict[str, object], place: str) -> None:
-    """Hold an entry to what the configuration allows, while its line is still known."""
+    """Check an entry against the configuration model while its line number is known."""
     try:
         CatalogueEntry.model_validate(entry)
     except ValidationError as error:

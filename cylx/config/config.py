@@ -1,7 +1,7 @@
-"""The configuration: the YAML file mirrored, one frozen model a stage, every value with its default, unit and sentence.
+"""The configuration: a mirror of the YAML file, one frozen model per stage, each value with default, unit and meaning.
 
-Precedence: defaults < preset < YAML file < `--set section.key=value` < named option. `null` means "from the cloud" and
-is resolved in one place (`cylx.scene.resolve`); the resolved configuration goes into every result.
+Precedence: defaults < preset < YAML file < `--set section.key=value` < named option. `null` means "from the cloud". It
+is resolved in one place (`cylx.scene.resolve`), and the resolved configuration is written to every result.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ class Config(Section):
     """All settings of a run."""
 
     preset: Preset = "auto"
-    """Where the values start from: `auto`, the best we can do, or `paper`, the paper to the letter."""
+    """Default settings: `auto`, the best there are, or `paper`, the paper to the letter."""
     method: Method = "gt"
-    """How cylinders are found: `gt`, the clustering game; the others are what the paper compares it with."""
+    """Method: `gt`, the clustering game; the others are the methods that the paper compares it with."""
     seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of everything random; the same seed gives the same bytes, on any number of threads."""
+    """Random seed; the same seed gives the same bytes, on any number of threads."""
     max_cylinders: Annotated[int, Field(ge=1)] | None = None
-    """Most cylinders extracted; null sets no limit."""
+    """Maximum number of cylinders; null sets no limit."""
     scene: SceneConfig = SceneConfig()
-    """What is known of the cloud."""
+    """Prior knowledge of the cloud."""
     slicing: SlicingConfig = SlicingConfig()
     """Stage 1: planes and their points."""
     ellipses: EllipsesConfig = EllipsesConfig()
@@ -51,9 +51,9 @@ class Config(Section):
     clustering: ClusteringConfig = ClusteringConfig()
     """Stage 4: the game."""
     averaging: AveragingConfig = AveragingConfig()
-    """Stage 5: one cylinder a cluster."""
+    """Stage 5: one cylinder per cluster."""
     verification: VerificationConfig = VerificationConfig()
-    """What a cylinder must show to be accepted."""
+    """What a cylinder must fulfil to be accepted."""
     msac: MsacConfig = MsacConfig()
     """Sample consensus, used by `method: msac`."""
     line_fit: LineFitConfig = LineFitConfig()
@@ -78,20 +78,20 @@ def load_config(
     options: Mapping[str, object] | None = None,
     start: Config | None = None,
 ) -> Config:
-    """Put a configuration together: defaults < preset < YAML file < overrides < named options.
+    """Build a configuration: defaults < preset < YAML file < overrides < named options.
 
     Parameters
     ----------
     path : str or Path, optional
         A YAML file.
     preset : str, optional
-        Where the values start from; wins over a preset named in the file or by an override.
+        Default settings; overrides a preset named in the file or by an override.
     overrides : sequence of str
-        Each `section.key=value`, the value written as in YAML; a later one wins.
+        Each `section.key=value`, the value written as in YAML; later ones override earlier ones.
     options : mapping of str to object, optional
         Values by dotted key.
     start : Config, optional
-        What to change, instead of the defaults.
+        The configuration to change, instead of the defaults.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def load_config(
 
 
 def _check_known(scene: SceneConfig) -> None:
-    """Refuse what makes sense only with something else, or without; layers are validated by themselves before."""
+    """Check keys of the scene that need or exclude each other; each layer has been validated by itself before."""
     pairs = {
         "known_radius_sd": (scene.known_radius_sd, scene.known_radius, "known_radius"),
         "axis_sd_deg": (scene.axis_sd_deg, scene.axis, "axis"),
@@ -136,7 +136,7 @@ def _check_known(scene: SceneConfig) -> None:
 
 
 def _check_method(config: Config) -> None:
-    """Refuse what the other methods cannot do: they have no covariance for what is known to be weighed by."""
+    """Refuse priors for the other methods: they compute no covariance to weigh a prior against."""
     if config.method == "gt":
         return
     for name in ("known_radius", "axis_sd_deg", "catalogue"):
@@ -146,26 +146,26 @@ def _check_method(config: Config) -> None:
 
 
 def check_tolerance(config: Config, options: Mapping[str, object]) -> None:
-    """Refuse a tolerance that was asked for by name, by `named_options`, where there is no axis.
+    """Refuse a tolerance given by a named option (see `named_options`) if there is no axis.
 
     Raises
     ------
     ConfigError
-        If so.
+        If there is no axis.
     """
     if config.scene.axis is None and "scene.axis_tolerance_deg" in options:
-        fault = "is given without the axis that it is to hold for"
+        fault = "is given without the axis it refers to"
         raise ConfigError("axis tolerance", fault, "give --axis X,Y,Z, or scene.axis, too")
 
 
 def _without_empty_sections(layer: Layer) -> Layer:
-    """Drop sections whose keys are all commented out, which YAML reads as null."""
+    """Drop sections whose keys are all commented out; YAML reads them as null."""
     sections = {name for name, field in Config.model_fields.items() if isinstance(field.default, Section)}
     return Layer(layer.prefix, {key: v for key, v in layer.values.items() if v is not None or key not in sections})
 
 
 def _validate(values: dict[str, Any], layers: Sequence[Layer]) -> Config:
-    """Make the configuration of its values, or say which of them is wrong and in which layer it was given."""
+    """Build the configuration, or report the wrong value and the layer that gave it."""
     try:
         return Config.model_validate(values)
     except ValidationError as error:

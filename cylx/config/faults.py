@@ -1,4 +1,4 @@
-"""What is wrong with a configuration, in the user's words: the dotted path, the fault, the remedy."""
+"""Describe the faults of a configuration to the user: the dotted path, the fault, the remedy."""
 
 from __future__ import annotations
 
@@ -32,27 +32,27 @@ _KINDS = {
 
 
 def describe_fault(error: ValidationError, model: type[BaseModel]) -> tuple[tuple[str, ...], str, str]:
-    """Say what the first fault of a failed validation is.
+    """Describe the first fault of a failed validation.
 
     Parameters
     ----------
     error : pydantic.ValidationError
         The failure.
     model : type of pydantic.BaseModel
-        What was validated.
+        The model that was validated.
 
     Returns
     -------
     path : tuple of str
         Keys that lead to the fault; empty for the model as a whole.
     fault, remedy : str
-        What is wrong, and what to do about it.
+        What is wrong, and how to correct it.
     """
     return describe_faults(error, model)[0]
 
 
 def describe_faults(error: ValidationError, model: type[BaseModel]) -> list[tuple[tuple[str, ...], str, str]]:
-    """Say what all faults of a failed validation are, one of each path, as `describe_fault` does of the first."""
+    """Describe all faults of a failed validation, one per path, in the form of `describe_fault`."""
     found: dict[tuple[str, ...], tuple[str, str]] = {}
     for details in error.errors(include_url=False):
         path = tuple(str(part) for part in details["loc"])
@@ -62,7 +62,7 @@ def describe_faults(error: ValidationError, model: type[BaseModel]) -> list[tupl
 
 
 def dotted_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """List the dotted path of every key of a model, sections before their keys."""
+    """Yield the dotted path of every key of a model, sections before their keys."""
     for name, field in model.model_fields.items():
         yield prefix + (field.alias or name)
         if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
@@ -87,7 +87,7 @@ def _fault_and_remedy(details: ErrorDetails, path: tuple[str, ...], model: type[
 
 
 def _suggest_key(path: tuple[str, ...], model: type[BaseModel]) -> str:
-    """Name the key that was probably meant, in the same section or in another one."""
+    """Suggest the key with the closest name, in the same section or in another one."""
     keys = list(dotted_keys(model))
     if path[-1] in keys:
         above, _, key = path[-1].rpartition(".")
@@ -101,29 +101,29 @@ def _suggest_key(path: tuple[str, ...], model: type[BaseModel]) -> str:
 
 
 def _model_at(path: tuple[str, ...], model: type[BaseModel]) -> type[BaseModel]:
-    """Give the model of the section, or of the entry of a list, that a path leads to."""
+    """Return the model of the section, or of the entry of a list, that a path leads to."""
     for part in path:
-        field = model.model_fields.get(part)  # the number of an entry is no field, and leads no further
+        field = model.model_fields.get(part)  # the index of a list entry is not a field, and is skipped
         model = model if field is None else _model_in(field.annotation) or model
     return model
 
 
 def _model_in(annotation: object) -> type[BaseModel] | None:
-    """Give the model that an annotation speaks of: itself, or of the entries of a list."""
+    """Return the model in an annotation: the annotation itself, or the model of the entries of a list."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     return next(filter(None, map(_model_in, get_args(annotation))), None)
 
 
 def _suggest_value(value: object, expected: str) -> str:
-    """Name the value that was probably meant, or all there are; `expected` is pydantic's list of them."""
+    """Suggest the closest value, or list all; `expected` is pydantic's list of them."""
     choices = [word for word in expected.split("'") if word not in {"", ", ", " or "}]
     close = get_close_matches(str(value), choices, n=1)
     return f"did you mean '{close[0]}'?" if close else f"choose {' or '.join(choices)}"
 
 
 def _show(value: object) -> str:
-    """Show a value as it would stand in YAML, shortened."""
+    """Format a value as in YAML, shortened."""
     if value is None or isinstance(value, bool):
         return str(value).lower().replace("none", "null")
     if isinstance(value, dict):

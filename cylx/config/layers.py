@@ -1,4 +1,4 @@
-"""The layers a configuration is put together from: presets, files, overrides and options, as plain nested values."""
+"""The layers of a configuration: presets, files, overrides and options, as plain nested values."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ _AXES = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
 
 
 class Layer(NamedTuple):
-    """Values that were given in one place.
+    """Values given in one place.
 
     Parameters
     ----------
     prefix : str
-        How an error names the place, in front of the dotted path.
+        Name of the place in errors, in front of the dotted path.
     values : dict
         Nested as in the file.
     """
@@ -32,7 +32,7 @@ class Layer(NamedTuple):
 
 
 def preset_layer(name: str) -> Layer:
-    """Read a preset from the file that comes with the package."""
+    """Read a preset from its file in the package."""
     text = (files("cylx") / "presets" / f"{name}.yaml").read_text(encoding="utf-8")
     return Layer(f"preset {name}: ", _mapping(parse_yaml(text, f"preset {name}"), f"preset {name}"))
 
@@ -56,7 +56,7 @@ def file_layer(path: str | Path) -> Layer:
 
 
 def _mapping(values: object, place: str) -> dict[str, Any]:
-    """Insist on keys at the top level; an empty document has none."""
+    """Check that the top level is a mapping; an empty document is an empty mapping."""
     if values is None:
         return {}
     if not isinstance(values, dict):
@@ -65,7 +65,7 @@ def _mapping(values: object, place: str) -> dict[str, Any]:
 
 
 def override_layer(text: str) -> Layer:
-    """Read one `section.key=value`."""
+    """Parse one `section.key=value`."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise ConfigError(f"--set {text}", "has no key and value", "write --set section.key=value")
@@ -86,7 +86,7 @@ def named_options(
     catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
 ) -> dict[str, object]:
-    """Give the dotted keys that the named options of the command line and of `cylx.extract` stand for.
+    """Return the dotted keys for the named options of the command line and of `cylx.extract`.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def named_options(
     seed, max_cylinders, planes : int, optional
         As in the configuration.
     radius : pair of float or None, optional
-        Smallest and largest radius, scene units; None leaves a side to the configuration.
+        Smallest and largest radius, scene units; None keeps that limit of the configuration.
     axis : sequence of float or str, optional
         Direction of the cylinders, three numbers, or `x`, `y` or `z`.
     axis_tolerance_deg : float, optional
@@ -103,9 +103,9 @@ def named_options(
     axis_sd_deg : float, optional
         Standard deviation of the cylinders' tilts from the axis, degrees.
     known_radius : pair of float, optional
-        Radius that the cylinders are known to have, and its standard deviation or None, scene units.
+        Known radius of the cylinders, and its standard deviation or None, scene units.
     catalogue : str, path-like, or sequence, optional
-        Nominal radii: a file of them, entries as in the configuration, or just radii, scene units.
+        Nominal radii: a file, entries as in the configuration, or just radii, scene units.
     min_coverage_deg : float, optional
         Smallest angle about the axis that must be covered, degrees.
 
@@ -144,10 +144,10 @@ NAMED_OPTIONS = tuple(named_options.__kwdefaults__ or ())
 
 
 def _axis(axis: Sequence[float] | str) -> object:
-    """Give a direction as the file would have it; what is none is left for the validation to name."""
+    """Return a direction in the form of the file; the validation reports any other value."""
     if isinstance(axis, str):
         return _AXES.get(axis, axis)
-    return [x.item() if hasattr(x, "item") else x for x in axis]  # numpy's numbers are not those of YAML
+    return [x.item() if hasattr(x, "item") else x for x in axis]  # Python numbers instead of numpy's
 
 
 def nested(key: str, value: object) -> dict[str, Any]:
@@ -157,7 +157,7 @@ def nested(key: str, value: object) -> dict[str, Any]:
 
 
 def merge(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
-    """Lay one set of values over another, section by section."""
+    """Override one set of values by another, section by section."""
     merged = dict(below)
     for key, value in above.items():
         both = isinstance(value, dict) and isinstance(merged.get(key), dict)

@@ -1,4 +1,4 @@
-"""The sections of the configuration: one frozen model a stage, every value with its default, unit and sentence."""
+"""The sections of the configuration: one frozen model per stage, each value with default, unit and meaning."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class CatalogueEntry(Section):
     """A nominal radius."""
 
     name: str | None = None
-    """What it is called, as in `DN50`: up to 40 printable characters."""
+    """Its name, such as `DN50`: up to 40 printable characters."""
     radius: Positive
     """Nominal radius, scene units."""
     tolerance: Positive | None = None
@@ -35,48 +35,48 @@ class CatalogueEntry(Section):
     @classmethod
     def _check_name(cls, name: str | None) -> str | None:
         if name is not None and not (0 < len(name) <= 40 and name.isprintable() and name == name.strip()):
-            raise ValueError("the name is no name; write 1 to 40 printable characters without spaces around them")
+            raise ValueError("the name is invalid; write 1 to 40 printable characters without spaces around them")
         return name
 
     @property
     def spread(self) -> float:
-        """The tolerance, scene units, also where it is null."""
+        """The tolerance, scene units, with null replaced by its default."""
         return self.tolerance or 2e-3 * self.radius
 
 
 class SceneConfig(Section):
-    """What is known of the cloud before looking at it; `null` is read off the cloud."""
+    """Prior knowledge of the cloud; `null` values are measured in the cloud."""
 
     spacing: Positive | None = None
     """Distance of neighbouring points on a surface, scene units."""
     noise: Positive | None = None
-    """Standard deviation of points about their surface, scene units."""
+    """Standard deviation of the points about their surface, scene units."""
     radius_min: Positive | None = None
-    """Smallest radius looked for, scene units. Raising it drops thin pipes."""
+    """Smallest radius to find, scene units. Raising it drops thin pipes."""
     radius_max: Positive | None = None
-    """Largest radius looked for, scene units. Lowering it drops tanks and walls that are hardly curved."""
+    """Largest radius to find, scene units. Lowering it drops tanks and walls that are hardly curved."""
     axis: Axis | None = None
-    """Direction of the cylinders looked for, in the coordinates of the scan; its length and sign do not matter."""
+    """Direction of the cylinders to find, in the coordinates of the scan; its length and sign do not matter."""
     axis_tolerance_deg: Annotated[Number, Field(gt=0, le=90)] = 10.0
-    """Largest angle of a cylinder to `axis`, degrees; means nothing without it."""
+    """Largest angle between a cylinder and `axis`, degrees; has no effect without `axis`."""
     axis_sd_deg: Annotated[Number, Field(gt=0, le=90)] | None = None
-    """Standard deviation of the cylinders' tilts from `axis`, degrees: each fit is drawn to it; null draws none."""
+    """Standard deviation of the cylinders' tilts from `axis`, degrees: a prior for each fit; null sets no prior."""
     known_radius: Positive | None = None
-    """Radius the cylinders are known to have, scene units: each fit is drawn to it that does not contradict it."""
+    """Known radius of the cylinders, scene units: a prior for each fit that does not contradict it."""
     known_radius_sd: Positive | None = None
     """Standard deviation of `known_radius`, scene units; null is a thousandth of it."""
     catalogue: Annotated[list[CatalogueEntry], Field(min_length=1)] | None = None
-    """Nominal radii, each `{name: DN50, radius: 0.03015, tolerance: 0.0001}`: a fit is drawn to one it bears out."""
+    """Nominal radii, each `{name: DN50, radius: 0.03015, tolerance: 0.0001}`: priors for the fits that support one."""
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Which of `spacing` and `noise` are given, and not measured."""
+        """Which of `spacing` and `noise` are given instead of measured."""
         return tuple(name for name in ("spacing", "noise") if getattr(self, name) is not None)
 
     @model_validator(mode="after")
     def _check_axis(self) -> SceneConfig:
         if self.axis is not None and not any(self.axis):
-            raise ValueError("axis [0, 0, 0] is no direction; write [0, 0, 1] for upright")
+            raise ValueError("axis [0, 0, 0] is not a direction; write [0, 0, 1] for upright")
         return self
 
     @model_validator(mode="after")
@@ -99,11 +99,11 @@ class SlicingConfig(Section):
     planes: Annotated[int, Field(ge=0)] = 40
     """Number of random planes N. More planes find more cylinders and take longer."""
     inclination_deg: Annotated[list[Inclination], Field(min_length=2, max_length=2)] | None = None
-    """Least and greatest angle of the normals of these planes to `scene.axis`, degrees; null draws any."""
+    """Least and greatest angle of the normals of these planes to `scene.axis`, degrees; null sets no limits."""
     local_planes: Annotated[int, Field(ge=0)] = 1
-    """Planes through each window, besides one across its longest direction; 0 leaves the windows out."""
+    """Planes through each window, besides one across its longest direction; 0 uses no windows."""
     windows: Annotated[int, Field(ge=1)] = 2000
-    """Most windows of one scale, where nothing else explains the points. More windows find more thin, sparse pipes."""
+    """Most windows of one scale, at points not explained otherwise. More windows find more thin, sparse pipes."""
     thickness: Positive | None = None
     """Full thickness of a slice through the whole cloud, scene units. Thicker slices smear the ellipse."""
     min_points: Annotated[int, Field(ge=6)] = 20
@@ -121,9 +121,9 @@ class EllipsesConfig(Section):
     """Ellipses in each slice, by RANSAC and the direct least-squares fit."""
 
     pieces: bool = True
-    """Look in each connected piece of a slice by itself; false looks in the slice as a whole, as the paper does."""
+    """Search each connected piece of a slice by itself; false searches the whole slice, as the paper does."""
     iterations: Annotated[int, Field(ge=1)] = 200
-    """RANSAC samples an ellipse. More samples stand more outliers and take longer."""
+    """RANSAC samples per ellipse. More samples tolerate more outliers and take longer."""
     tolerance: Positive | None = None
     """Distance within which a point supports an ellipse, scene units."""
     min_inliers: Annotated[int, Field(ge=6)] = 20
@@ -140,11 +140,11 @@ class CandidatesConfig(Section):
     """Cylinder candidates, from the ellipses of slices and from local curvature."""
 
     sources: Annotated[list[Literal["slices", "curvature"]], Field(min_length=1)] = ["slices", "curvature"]
-    """Where candidates come from; the paper has slices alone."""
+    """Where candidates come from; the paper uses slices only."""
     polish: bool = True
-    """Fit each candidate to the points about it before the game."""
+    """Fit each candidate to the points around it before the game."""
     octave: Annotated[Number, Field(gt=1.1, le=4)] = 1.6
-    """Ratio of successive window radii. A smaller ratio looks at more scales and takes longer."""
+    """Ratio of successive window radii. A smaller ratio uses more scales and takes longer."""
     window_spacings: Positive = 2.2
     """Radius of the smallest curvature window, in spacings."""
     window_noises: Positive = 5.0
@@ -156,7 +156,7 @@ class CandidatesConfig(Section):
 
 
 class ClusteringConfig(Section):
-    """The game that candidates play for their clusters."""
+    """The game that groups candidates into clusters."""
 
     kernel: Literal["screw", "local"] = "local"
     """`screw`: eq. 1 and 2 of the paper; `local`: angle, offset at the candidates in radii, and ratio of radii."""
@@ -169,17 +169,17 @@ class ClusteringConfig(Section):
     radius: Positive = 0.06
     """Relative difference of radii at which the `local` kernel has fallen to 1/e."""
     min_radius_ratio: Share = 0.75
-    """p of eq. 2: candidates whose radii differ more are incompatible."""
+    """p of eq. 2: candidates whose radii differ by more are incompatible."""
     diagonal: Annotated[Number, Field(ge=0, le=1)] = 0.0
-    """Payoff of a candidate against itself; 1 in eq. 5, but then every stable state is one single candidate."""
+    """Payoff of a candidate against itself; with 1, as in eq. 5, every stable state is a single candidate."""
     dynamics: Literal["replicator", "infection-immunization"] = "infection-immunization"
     """How the population evolves: eq. 7, or a faster way to the same equilibria."""
     population: Literal["whole", "local"] = "local"
-    """Who plays: all candidates that are left, or the best connected one and its neighbours."""
+    """Players of a game: all remaining candidates, or the best connected one and its neighbours."""
     max_iterations: Annotated[int, Field(ge=1)] = 300
-    """Most steps of the dynamics a cluster."""
+    """Most steps of the dynamics per cluster."""
     tolerance: Positive = 1e-4
-    """The dynamics stop when a step changes the shares by less than this, or when nobody could gain more than this."""
+    """The dynamics stop when a step changes the shares by less than this, or no player could gain more than this."""
     min_support: Annotated[int, Field(ge=1)] = 3
     """A cluster with fewer candidates is dropped."""
     min_payoff: Share = 0.3
@@ -190,24 +190,24 @@ class AveragingConfig(Section):
     """From the candidates of a cluster to one cylinder."""
 
     max_iterations: Annotated[int, Field(ge=1)] = 20
-    """Most steps of the dual-quaternion blending; where `refine` is on, its fit takes the place of it."""
+    """Most steps of the dual-quaternion blending; not used if `refine` is on, whose fit replaces it."""
     refine: bool = True
-    """Fit the average to all its points in the cloud, and let it grow along its axis."""
+    """Fit the average to all its points in the cloud, and extend it along its axis."""
     merge: bool = True
-    """Join pieces of one pipe where one cylinder explains both."""
+    """Join pieces of one pipe if one cylinder explains both."""
 
 
 class VerificationConfig(Section):
-    """What a cylinder must show to be accepted: its confidence, and limits that hold whatever the confidence."""
+    """What a cylinder must fulfil to be accepted: a confidence, and limits that hold whatever the confidence."""
 
     enabled: bool = True
-    """Verify at all; the paper does not."""
+    """Verify cylinders; the paper does not."""
     min_confidence: Share = 0.5
     """Least confidence. Raising it gives fewer false cylinders and more missed ones."""
     min_inliers: Annotated[int, Field(ge=0)] = 40
     """Fewest points of a cylinder."""
     min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 20.0
-    """Smallest angle about the axis that must be covered, degrees. This one holds even if `enabled` is false."""
+    """Smallest angle about the axis that must be covered, degrees. This limit holds even if `enabled` is false."""
     min_height: Annotated[Number, Field(ge=0)] = 0.4
     """Smallest visible length, in radii."""
     max_slope: Annotated[Number, Field(ge=0)] = 0.03

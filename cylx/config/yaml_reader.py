@@ -1,7 +1,7 @@
-"""YAML read strictly: what is written is what is meant.
+"""A strict YAML reader.
 
-Of YAML only what a configuration needs: mappings, lists, and the scalars of YAML 1.2, so that `1e-3` is a number and
-`yes` is a word. Tags, anchors, aliases and repeated keys are errors, and nothing is ever constructed but plain data.
+It reads only what a configuration needs: mappings, lists, and the scalars of YAML 1.2, so that `1e-3` is a number and
+`yes` is a word. Tags, anchors, aliases and repeated keys are errors, and only plain data are constructed.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ def parse_yaml(text: str, place: str) -> object:
 
 
 def entry_lines(text: str) -> list[int]:
-    """Give the line of each entry of a list that `parse_yaml` has read."""
+    """Return the line number of each entry of a list that `parse_yaml` has read."""
     node = yaml.compose(text, Loader=yaml.SafeLoader)
     return [item.start_mark.line + 1 for item in node.value] if isinstance(node, yaml.SequenceNode) else []
 
 
 def _refuse_anchors_and_tags(text: str, place: str) -> None:
-    """Stop at the first anchor, alias, tag or deep nesting, before anything is composed of it."""
+    """Refuse anchors, aliases, tags and deep nesting, before anything is constructed."""
     depth = 0
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         line = _line(place, event.start_mark)
@@ -81,7 +81,7 @@ def _refuse_anchors_and_tags(text: str, place: str) -> None:
 
 
 def _line(place: str, mark: object) -> str:
-    """Name the line of a mark, if there is one."""
+    """Return the place with the line of a mark, if there is one."""
     line = getattr(mark, "line", None)
     return place if line is None else f"{place}:{line + 1}"
 
@@ -97,7 +97,7 @@ def _plain(node: yaml.Node, place: str) -> object:
 
 
 def _mapping(node: yaml.MappingNode, place: str) -> dict[str, object]:
-    """Turn a mapping node into a dict whose keys are all different."""
+    """Turn a mapping node into a dict; repeated keys are errors."""
     mapping: dict[str, object] = {}
     for key_node, value_node in node.value:
         line = _line(place, key_node.start_mark)
@@ -111,7 +111,7 @@ def _mapping(node: yaml.MappingNode, place: str) -> dict[str, object]:
 
 
 def _scalar(text: str) -> object:
-    """Read an unquoted scalar: nothing, a truth value, a number, or a word."""
+    """Parse an unquoted scalar: null, a truth value, a number, or a word."""
     if text.lower() in _WORDS and text in {text.lower(), text.title(), text.upper()}:
         return _WORDS[text.lower()]
     if _INTEGER.match(text):

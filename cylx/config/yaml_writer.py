@@ -1,4 +1,4 @@
-"""The configuration as a YAML text that explains itself: every key with its value, its meaning and what it may be."""
+"""The configuration as commented YAML: every key with its value, its meaning and its allowed values."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ _WIDTH = 100
 _BOUNDS = {"exclusiveMinimum": ">", "minimum": ">=", "exclusiveMaximum": "<", "maximum": "<="}
 _HEADER = """\
 # Configuration of cylx. Lengths are in the unit of the scan; null means "from the cloud".
-# Leave out what you do not want to change: what is missing keeps the value of the preset.
+# Leave out what you do not want to change: missing keys keep the value of the preset.
 
 """
 
 
 def commented_yaml(config: Config) -> str:
-    """Write a configuration as YAML with a comment above every key.
+    """Format a configuration as YAML with a comment above every key.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def commented_yaml(config: Config) -> str:
 
 
 def plain_yaml(config: Config) -> str:
-    """Write a configuration as YAML without comments."""
+    """Format a configuration as YAML without comments."""
     return yaml.safe_dump(config.model_dump(mode="json"), sort_keys=False)
 
 
 def _lines(schema: _Object, sections: _Object, values: _Object, indent: str) -> Iterator[str]:
-    """Write the keys of one section, and of the sections in it."""
+    """Yield the lines of one section, and of the sections in it."""
     for key, entry in schema["properties"].items():
         section = sections.get(str(entry.get("$ref", "")).rpartition("/")[2])
         if section is not None:
@@ -58,7 +58,7 @@ def _lines(schema: _Object, sections: _Object, values: _Object, indent: str) -> 
 
 
 def _comment(entry: _Object, indent: str) -> Iterator[str]:
-    """Write the sentence of a key and what the key may be."""
+    """Yield the lines of a comment: the meaning of a key and its allowed values."""
     for line in wrap(entry["description"], _WIDTH - len(indent) - 2):
         yield f"{indent}# {line}"
     if "$ref" not in entry:
@@ -66,7 +66,7 @@ def _comment(entry: _Object, indent: str) -> Iterator[str]:
 
 
 def _allowed(entry: _Object) -> str:
-    """Say which values a key may have."""
+    """Describe the allowed values of a key."""
     if "anyOf" in entry:
         return " or ".join(_allowed(choice) for choice in entry["anyOf"])
     if "$ref" in entry:
@@ -82,7 +82,7 @@ def _allowed(entry: _Object) -> str:
 
 
 def _scalar(value: object) -> str:
-    """Write one value in the flow style of YAML."""
+    """Format one value in the flow style of YAML."""
     return (
         yaml.safe_dump(value, default_flow_style=True, width=10**9, allow_unicode=True).removesuffix("\n...\n").strip()
     )

@@ -1,7 +1,7 @@
-"""How right a result is, and whether two results are the same cylinders.
+"""Evaluation of a result against a truth, and comparison of two results.
 
-Both questions are asked of JSON objects: any mapping whose `cylinders` have `axis_point`, `axis_direction`, `radius`
-and, where they are known, `id`, `height`, `inliers` and (in a truth) `ignore`.
+Both take JSON objects: any mapping whose `cylinders` have `axis_point`, `axis_direction`, `radius` and, if known,
+`id`, `height`, `inliers` and (in a truth) `ignore`.
 """
 
 from cylx.evaluation.regression import Comparison, Difference, Tolerances, compare

@@ -1,4 +1,4 @@
-"""Cylinders out of JSON objects, the errors of every pair of them, and the best one-to-one matching."""
+"""Read cylinders from JSON objects, compute the errors of all pairs, and find the best one-to-one matching."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class CylinderTable:
     ids : tuple of int
         As given, or the position in the list.
     points, directions : ndarray of shape (N, 3)
-        Axis; the directions are of unit length, NaN where they were not finite or zero.
+        Axis; the directions are of unit length, NaN if they were not finite or zero.
     radii, heights, inliers : ndarray of shape (N,)
         Scene units; NaN where unknown.
     ignore : ndarray of shape (N,), bool
@@ -51,7 +51,7 @@ class CylinderTable:
         return np.asarray(finite & np.isfinite(self.radii))
 
     def subset(self, chosen: MaskArray) -> CylinderTable:
-        """Give the chosen ones."""
+        """Return the chosen cylinders."""
         ids = tuple(id_ for id_, wanted in zip(self.ids, chosen, strict=True) if wanted)
         return CylinderTable(
             ids=ids,
@@ -66,12 +66,12 @@ class CylinderTable:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PairErrors:
-    """How far each cylinder b is from each cylinder a.
+    """The errors of each cylinder b relative to each cylinder a.
 
     Parameters
     ----------
     angle_deg : ndarray of shape (A, B)
-        Between the axes, degrees, in [0, 90].
+        Angle between the axes, degrees, in [0, 90].
     offset : ndarray of shape (A, B)
         Distance of a's point from b's axis line, in radii of a.
     radius : ndarray of shape (A, B)
@@ -94,12 +94,12 @@ def read_cylinders(document: Mapping[str, object], place: str) -> CylinderTable:
     document : mapping
         With a list `cylinders` of objects.
     place : str
-        What the errors call the document.
+        Name of the document in errors.
 
     Raises
     ------
     InputError
-        If a key is missing or its value is of the wrong kind; the place is dotted, as in `truth.cylinders[3].radius`.
+        If a key is missing or has a value of the wrong kind; the place is dotted, as in `truth.cylinders[3].radius`.
     """
     entries = document.get("cylinders") if isinstance(document, Mapping) else None
     if not isinstance(entries, list | tuple):
@@ -129,11 +129,11 @@ def require_usable(table: CylinderTable, place: str) -> None:
     bad = ~(table.usable & (table.radii > 0))
     if bad.any():
         here = f"{place}.cylinders[{int(bad.argmax())}]"
-        raise InputError(here, "has no finite axis or no radius > 0", "mend its numbers, or leave it out")
+        raise InputError(here, "has no finite axis or no radius > 0", "correct its numbers, or leave it out")
 
 
 def pair_errors(a: CylinderTable, b: CylinderTable) -> PairErrors:
-    """Measure every pair; row by row, so that coordinates far from the origin lose nothing and memory stays small."""
+    """Compute the errors of all pairs, row by row, which keeps the precision far from the origin and saves memory."""
     angle, offset, shift = np.empty((3, len(a), len(b)))
     for i in range(len(a)):
         sine = np.linalg.norm(np.cross(a.directions[i], b.directions), axis=1)
@@ -146,12 +146,12 @@ def pair_errors(a: CylinderTable, b: CylinderTable) -> PairErrors:
 
 
 def match_one_to_one(cost: FloatArray, admissible: MaskArray) -> tuple[IndexArray, IndexArray]:
-    """Find as many admissible pairs as possible, at the least total cost.
+    """Find the largest number of admissible pairs, at the least total cost.
 
     Parameters
     ----------
     cost : ndarray of shape (A, B)
-        Of order one where admissible.
+        Of order one for admissible pairs.
     admissible : ndarray of shape (A, B), bool
 
     Returns

@@ -1,4 +1,4 @@
-"""Whether two results are the same cylinders within tolerances: for regression runs on fixtures."""
+"""Compare two results within tolerances, for regression tests."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from cylx.geometry.arrays import FloatArray
 
 Kind = Literal["missing", "extra", "moved", "resized", "recounted"]
 
-_SAME_ANGLE_DEG = 5.0  # within these, two cylinders are the same one with other numbers
+_SAME_ANGLE_DEG = 5.0  # within these limits two cylinders count as the same, with different parameters
 _SAME_OFFSET = 0.25
 _SAME_RADIUS = 0.15
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tolerances:
-    """How much two results may differ.
+    """The allowed differences of two results.
 
     Parameters
     ----------
     angle_deg : float
-        Between the axes, degrees.
+        Angle between the axes, degrees.
     offset : float
-        Between the axes at the middle of either cylinder, in radii.
+        Distance of the axes at the middle of either cylinder, in radii.
     radius : float
-        Relative.
+        Of the radii, relative.
     height : float
         Of the heights, and of the mid-points along the axis, relative to the larger height plus radius.
     inliers : float
-        Relative.
+        Of the numbers of inliers, relative.
     """
 
     angle_deg: float = 0.1
@@ -59,7 +59,7 @@ class Tolerances:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """One thing in which two results differ.
+    """One difference of two results.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ class Difference:
     what : str
         `cylinder`, `angle_deg`, `offset`, `shift` (along the axis), `height`, `radius` or `inliers`.
     a, b : float or None
-        The values in a and b, where each has one of its own; the radius of a missing or extra cylinder.
+        The values in a and b, if there are any; the radius of a missing or extra cylinder.
     difference, tolerance : float or None
-        What they differ by and what was allowed, both in the unit of the tolerance.
+        The difference and its tolerance, in the same unit.
     """
 
     kind: Kind
@@ -87,14 +87,14 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What two results have in common and what not.
+    """The common cylinders and the differences of two results.
 
     Parameters
     ----------
     cylinders_a, cylinders_b, matched : int
-        Cylinders in a, in b, and in both.
+        Number of cylinders in a, in b, and in both.
     differences : tuple of Difference
-        In the order of a, what is only in b last; empty if the results are the same.
+        In the order of a, with those only in b last; empty if the results are the same.
     """
 
     cylinders_a: int
@@ -104,11 +104,11 @@ class Comparison:
 
     @property
     def same(self) -> bool:
-        """Whether nothing differs by more than its tolerance."""
+        """Whether no difference exceeds its tolerance."""
         return not self.differences
 
     def to_dict(self) -> dict[str, object]:
-        """Give everything as a JSON object."""
+        """Return everything as a JSON object."""
         return {
             "same": self.same,
             "cylinders_a": self.cylinders_a,
@@ -119,16 +119,16 @@ class Comparison:
 
 
 def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tolerances = Tolerances()) -> Comparison:
-    """Say whether two results are the same cylinders, in whatever order.
+    """Compare the cylinders of two results, in any order.
 
-    Heights and inliers are compared where both results have them. A difference equal to its tolerance is allowed.
+    Heights and inliers are compared if both results have them. A difference equal to its tolerance is allowed.
 
     Parameters
     ----------
     a, b : mapping
         JSON objects with a list `cylinders`.
     tolerances : Tolerances
-        What is allowed.
+        The allowed differences.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tol
 
 
 def _mutual_errors(left: CylinderTable, right: CylinderTable) -> PairErrors:
-    """Measure every pair from both sides and take the larger error; shifts relative to the longer cylinder."""
+    """Compute the errors of all pairs in both directions and take the larger; shifts are relative to the longer one."""
     forth, back = pair_errors(left, right), pair_errors(right, left)
     known = np.isfinite(left.heights)[:, None] & np.isfinite(right.heights)
     shift = np.maximum(forth.shift, back.shift.T) / np.maximum(_lengths(left)[:, None], _lengths(right))
@@ -169,7 +169,7 @@ def _mutual_errors(left: CylinderTable, right: CylinderTable) -> PairErrors:
 def _same_cylinders(
     left: CylinderTable, right: CylinderTable, errors: PairErrors, tolerances: Tolerances
 ) -> dict[int, int]:
-    """Say which position in b is that in a: about the same axis and radius, and side by side along it."""
+    """Return the position in b for positions in a: cylinders about the same axis and radius, side by side along it."""
     lengths = _lengths(left)[:, None], _lengths(right)
     beside = 0.5 * (1 + np.minimum(*lengths) / np.maximum(*lengths))
     limited = (
@@ -186,7 +186,7 @@ def _same_cylinders(
 def _differences(
     left: CylinderTable, right: CylinderTable, pair: tuple[int, int], errors: PairErrors, tolerances: Tolerances
 ) -> Iterator[Difference]:
-    """Name what differs between the two cylinders of a pair by more than its tolerance."""
+    """Yield the differences of a pair of cylinders that exceed their tolerances."""
     i, j = pair
     heights, inliers = (left.heights[i], right.heights[j]), (left.inliers[i], right.inliers[j])
     height = abs(heights[0] - heights[1]) / max(_lengths(left)[i], _lengths(right)[j])
@@ -200,7 +200,7 @@ def _differences(
         ("recounted", "inliers", inliers, count, tolerances.inliers),
     )
     for kind, what, values, difference, tolerance in measured:
-        if difference > tolerance:  # false where one of the two does not know
+        if difference > tolerance:  # false if one of the two values is unknown
             yield Difference(
                 kind=kind,
                 id_a=left.ids[i],
@@ -214,5 +214,5 @@ def _differences(
 
 
 def _lengths(table: CylinderTable) -> FloatArray:
-    """Give height plus radius: what differences along the axis are measured in."""
+    """Return height plus radius, the unit of differences along the axis."""
     return np.asarray(np.nan_to_num(table.heights) + table.radii)

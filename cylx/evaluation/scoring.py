@@ -1,4 +1,4 @@
-"""How right a result is: precision, recall and errors against a truth."""
+"""Score a result: precision, recall and errors against a truth."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from cylx.geometry.arrays import MaskArray
 
 @dataclass(frozen=True, slots=True)
 class Match:
-    """A true cylinder and the one that was found for it.
+    """A true cylinder and the one found for it.
 
     Parameters
     ----------
     truth_id, result_id : int
-        Their `id`, or position in the list where they have none.
+        Their `id`, or their position in the list if they have none.
     angle_deg : float
         Angle between the axes, degrees.
     offset : float
@@ -46,20 +46,20 @@ class Spread:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """What a result is worth.
+    """The score of a result.
 
     Parameters
     ----------
     truth, predicted, matched : int
-        True cylinders that must be found, cylinders in the result, and pairs of both.
+        Number of true cylinders that must be found, of cylinders in the result, and of matched pairs.
     duplicates : int
-        Further cylinders of the result on a true one that has its match already; they count as false.
+        Further cylinders of the result on a true one that is matched already; they count as false.
     ignored : int
-        Cylinders of the result on true ones that need not be found; they count neither way.
+        Cylinders of the result on true ones that need not be found; they count neither as correct nor as false.
     unusable : int
-        Entries of the result that are no cylinder (not finite, no direction); they are left out.
+        Entries of the result that are not cylinders (not finite, no direction); they are left out.
     precision, recall, f1 : float
-        In [0, 1]; all 1 where there is nothing to find and nothing was found.
+        In [0, 1]; all 1 if there is nothing to find and nothing was found.
     angle_deg, offset, radius : Spread or None
         Errors of the matches, as in `Match`; None without a match.
     pairs : tuple of Match
@@ -87,7 +87,7 @@ class Evaluation:
     false: tuple[int, ...]
 
     def to_dict(self) -> dict[str, object]:
-        """Give everything as a JSON object, keys in the order above."""
+        """Return everything as a JSON object, keys in the order above."""
         return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
 
 
@@ -99,10 +99,10 @@ def evaluate(
     offset: float = 0.25,
     radius: float = 0.15,
 ) -> Evaluation:
-    """Match a result with a truth, one to one, and say how good it is.
+    """Match a result with a truth, one to one, and score it.
 
-    A pair is admissible if its errors (see `Match`) are all below the given limits. Among the admissible pairs as
-    many as possible are matched, at the least sum of errors over limits. True cylinders marked `ignore` need not be
+    A pair is admissible if its errors (see `Match`) are all below the given limits. The largest possible number of
+    admissible pairs is matched, at the least sum of errors over limits. True cylinders marked `ignore` need not be
     found.
 
     Parameters

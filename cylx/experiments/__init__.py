@@ -1,4 +1,4 @@
-"""The paper's experiments (section 4), run again with its method, its competitors, and ours."""
+"""The paper's experiments (section 4), run again with its method, its competitors, and the default method."""
 
 from cylx.experiments.figures import FIGURES, Cell, Figure
 from cylx.experiments.pictures import draw

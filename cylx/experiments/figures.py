@@ -1,10 +1,10 @@
-"""The paper's figures 5 to 12 as lists of cells: what is varied, over what, with which methods.
+"""The paper's figures 5 to 12 as lists of cells: parameters varied, their values, and the methods.
 
-Where the paper gives a number it is used. It does not give the number of points (10 000 here), the height (4 radii), p
-of eq. 2 (0.9), the thickness of slices (0.05 radii) and the distance within which a point supports an ellipse (0.06
-radii, or four sigma if that is more), the two shares of outliers of figure 5 (0.1 and 0.4, with sigma = 0.01 and
-sigma_o = 0.04), the distances of Tran et al. and Jin et al. (as of MSAC), nor most of the places along the x axes. The
-best cluster counts, however small it is.
+The paper's numbers are used where it gives them. It does not give the number of points (10 000 here), the height (4
+radii), p of eq. 2 (0.9), the thickness of slices (0.05 radii) and the distance within which a point supports an ellipse
+(0.06 radii, or four sigma if that is more), the two shares of outliers of figure 5 (0.1 and 0.4, with sigma = 0.01 and
+sigma_o = 0.04), the distances of Tran et al. and Jin et al. (those of MSAC), nor most of the positions along the x
+axes. The best cluster is used, however small it is.
 """
 
 from __future__ import annotations
@@ -19,32 +19,32 @@ COMPETITORS = tuple(method for method in METHODS if method != "gt")
 CURVES = (*METHODS, "auto")
 """The paper's method and its competitors as the paper has them, and the default of cylx."""
 UNSURE = "auto, 0.02"
-"""The default that accepts from a confidence of 0.02: the other methods take what they have, however unlikely."""
+"""The default method with confidence from 0.02: the other methods accept their results, however unlikely."""
 
 _UNIT = ("msac.distance=0.03", "tran.distance=0.03", "jin.distance=0.03", "jin.neighbourhood=1.2")
 _ANY_CLUSTER = ("clustering.min_support=1", "clustering.min_payoff=0")
 _FROM_LITTLE = ("verification.min_confidence=0.02",)
-_UPRIGHT = ("scene.axis=[0, 0, 1]", "scene.axis_tolerance_deg=90")  # what the inclination refers to, and no limit
+_UPRIGHT = ("scene.axis=[0, 0, 1]", "scene.axis_tolerance_deg=90")  # reference for the inclination, without a limit
 _NOISY_TRAN = ("tran.neighbours=100", "tran.start_neighbours=200")
 
 
 class Cell(NamedTuple):
-    """One setting of a figure, tried many times.
+    """One setting of a figure; it is run many times.
 
     Parameters
     ----------
     panel : str
         Column of the figure.
     curve : str
-        What the legend calls it.
+        Its name in the legend.
     x : float
-        Where it is on the x axis.
+        Its position on the x axis.
     method : str
         `gt` (the paper's), one of its competitors, or `auto`.
     scene : tuple of (str, float)
         Parameters of the scene.
     settings : tuple of str
-        Of the form `section.key=value`.
+        Each of the form `section.key=value`.
     """
 
     panel: str
@@ -68,9 +68,9 @@ class Figure(NamedTuple):
     x_label : str
     cells : tuple of Cell
     logarithmic : bool
-        The y axis.
+        Whether the y axis is logarithmic.
     boxes : bool
-        Boxes rather than means.
+        Whether to draw boxes rather than means.
     """
 
     number: int
@@ -83,7 +83,7 @@ class Figure(NamedTuple):
 
     @property
     def needs_scan(self) -> bool:
-        """Whether it takes the scan of an object."""
+        """Whether it needs the scan of an object."""
         return self.kind.startswith("cans")
 
     @property
@@ -93,21 +93,21 @@ class Figure(NamedTuple):
 
 
 def _single(**changes: float) -> tuple[tuple[str, float], ...]:
-    """Give the parameters of a synthetic cylinder."""
+    """Return the parameters of a synthetic cylinder."""
     return tuple({"points": POINTS, "height": HEIGHT, **changes}.items())
 
 
 def _of_methods(
     panel: str, x: float, scene: tuple[tuple[str, float], ...], planes: int, settings: tuple[str, ...] = _UNIT
 ) -> Iterator[Cell]:
-    """Give the cells of all methods at one place."""
+    """Yield the cells of all methods at one position."""
     for method in CURVES:
         own = () if method == "auto" else (*_slices(planes, scene), *settings)
         yield Cell(panel, method, x, method, scene, own)
 
 
 def _slices(planes: int, scene: tuple[tuple[str, float], ...]) -> tuple[str, ...]:
-    """Give the settings of the paper's own method, which the line fit shares."""
+    """Return the settings of the paper's own method, also used by the line fit."""
     tolerance = max(0.06, 4 * dict(scene)["sigma"])
     slices = (f"slicing.planes={planes}", "slicing.thickness=0.05", f"ellipses.tolerance={tolerance:g}")
     return *slices, *_ANY_CLUSTER
@@ -157,7 +157,7 @@ def _figure_10() -> Iterator[Cell]:
 
 
 def _of_scan_methods(panel: str, x: float, scene: dict[str, float], planes: int, iterations: int) -> Iterator[Cell]:
-    """Give the cells of all methods that find several cylinders; distances are put in with the scan's size."""
+    """Yield the cells of all methods that find several cylinders; distances are set later from the scan's size."""
     normals = ("msac.neighbours=80", "tran.neighbours=80", f"msac.iterations={iterations}")
     for method in CURVES:
         if method != "line-fit":

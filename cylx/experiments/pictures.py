@@ -1,4 +1,4 @@
-"""Figures as pictures."""
+"""Draw the figures."""
 
 from __future__ import annotations
 
@@ -76,14 +76,14 @@ def draw(figure: Figure, summaries: list[Summary], trials: Trials) -> bytes:
 
 
 def _shown(figure: Figure) -> tuple[str, ...]:
-    """Give the quantities a kind of figure shows."""
+    """Return the quantities that a kind of figure shows."""
     if figure.kind == "cylinder":
         return QUANTITIES[:3]
     return QUANTITIES[:1] if figure.kind == "cans" else QUANTITIES[3:]
 
 
 def _curves(axes: Axes, here: list[Summary], quantity: str, _trials: Trials) -> None:
-    """Draw means with standard errors, what has one place only as a level line, and the bound."""
+    """Draw means with standard errors, curves with a single position as a level line, and the bound."""
     index = QUANTITIES.index(quantity)
     curves = list(dict.fromkeys(summary.cell.curve for summary in here))
     levels = [summary.cell.curve for summary in here]
@@ -94,7 +94,7 @@ def _curves(axes: Axes, here: list[Summary], quantity: str, _trials: Trials) -> 
             axes.axhline(own[0].means[index], label=curve, linestyle="--", linewidth=1.2, **style)
             continue
         x, y = [summary.cell.x for summary in own], [summary.means[index] for summary in own]
-        bars = [np.nan_to_num(summary.errors[index]) for summary in own]  # a single trial has none
+        bars = [np.nan_to_num(summary.errors[index]) for summary in own]  # NaN for a single trial
         axes.errorbar(x, y, bars, label=curve, marker="o", markersize=3, linewidth=1.3, capsize=2, **style)
     bounds = {summary.cell.x: summary.bound[index] for summary in here if summary.bound}
     if len({curve.partition(" ")[2] for curve in curves}) == 1 and len(bounds) > 1:
@@ -103,16 +103,16 @@ def _curves(axes: Axes, here: list[Summary], quantity: str, _trials: Trials) -> 
 
 
 def _style(summary: Summary, family: list[str]) -> dict[str, Any]:
-    """Give a method its colour; several curves of one method differ in shade."""
+    """Return the line style of a method; several curves of one method differ in shade."""
     if len(family) > 1:
         return {"color": SHADES[family.index(summary.cell.curve) % len(SHADES)]}
-    if summary.cell.curve == UNSURE:  # behind the default itself
+    if summary.cell.curve == UNSURE:  # drawn behind the default
         return {"color": COLORS[UNSURE], "zorder": 1.5}
     return {"color": COLORS[summary.cell.method]}
 
 
 def _boxes(axes: Axes, here: list[Summary], quantity: str, trials: Trials) -> None:
-    """Draw a box for each place, and the bound as a line."""
+    """Draw a box for each position, and the bound as a line."""
     index = QUANTITIES.index(quantity)
     for summary in here:
         cell = summary.cell

@@ -1,4 +1,4 @@
-"""Scenes made of the scan of one object: two of it (figure 11), or five among other things (figure 12)."""
+"""Scenes made from the scan of one object: two copies (figure 11), or five among other objects (figure 12)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FaceArray = IndexArray
 SCANNED = 373_205
 """Points of the paper's scan of the soup can; a mesh is sampled with as many."""
 NOISE_OF_SCAN = 0.002
-"""Noise that is put on the points of a mesh, as a share of its extent: 0.3 mm of a soup can."""
+"""Noise added to the points of a mesh, as a share of its extent: 0.3 mm for a soup can."""
 APART = 1.5
 """Distance of two cans, in extents."""
 
@@ -36,7 +36,7 @@ class ObjectScan:
 
     @classmethod
     def of(cls, vertices: FloatArray, faces: FaceArray | None) -> ObjectScan:
-        """Take points as they are; draw them from the faces of a mesh, evenly, with a little noise."""
+        """Take points as they are; sample the faces of a mesh evenly, with a little noise."""
         extent = float(np.linalg.norm(np.ptp(vertices, axis=0)))
         a, b, c = (vertices[[] if faces is None else faces[:, k]] for k in range(3))
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -51,7 +51,7 @@ class ObjectScan:
 
     @property
     def name(self) -> str:
-        """What tells it from other scans, eight digits."""
+        """Eight digits that identify the scan."""
         return hashlib.sha256(self.points.tobytes()).hexdigest()[:8]
 
     @property
@@ -60,7 +60,7 @@ class ObjectScan:
         return np.asarray(0.5 * (self.points.min(axis=0) + self.points.max(axis=0)))
 
     def seen_from(self, view_deg: float, side: float = 1.0, neighbours: int = 80) -> ObjectScan:
-        """Keep the points whose outward normal is at least so far from the view (0, `side`, 0), degrees."""
+        """Keep the points whose outward normal is at least this angle from the view (0, `side`, 0), degrees."""
         if view_deg <= 0:
             return self
         normals = estimate_normals(self.points, neighbours)
@@ -72,13 +72,13 @@ class ObjectScan:
 def two_cans(
     scan: ObjectScan, center: FloatArray, share: float, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Put a scan beside itself, moved in a random direction, and keep a random share of all points.
+    """Place a copy of a scan beside it, in a random direction, and keep a random share of all points.
 
     Parameters
     ----------
     scan : ObjectScan
     center : ndarray of shape (3,)
-        Of the whole object.
+        Middle of the whole object.
     share : float
         In (0, 1].
     rng : numpy.random.Generator
@@ -97,7 +97,7 @@ def two_cans(
 def cans_among_clutter(
     scan: ObjectScan, cans: int, points: int, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray]:
-    """Put several of an object, a floor, boxes and spheres side by side, and keep so many points.
+    """Place several copies of an object, a floor, boxes and spheres side by side, and keep this many points.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def cans_among_clutter(
     """
     extent, noise = scan.extent, NOISE_OF_SCAN * scan.extent
     places = np.array([(x, y, 0.0) for x in range(3) for y in range(3)])[rng.permutation(9)] * 1.3 * extent
-    dense = len(scan.points) // 2  # of any other thing
+    dense = len(scan.points) // 2  # points of each other object
     parts, centers = [], []
     for place in places[:cans]:
         turn = rng.uniform(0, 2 * np.pi)
@@ -129,19 +129,19 @@ def cans_among_clutter(
 
 
 def _turned(points: FloatArray, angle: float) -> FloatArray:
-    """Turn points about the vertical."""
+    """Rotate points about the vertical."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.asarray(points @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]]))
 
 
 def _box(n: int, extent: float, rng: np.random.Generator) -> FloatArray:
-    """Draw points of the faces of a box."""
+    """Draw points on the faces of a box."""
     inside = rng.random((n, 3)) - 0.5
     inside[np.arange(n), rng.integers(3, size=n)] = rng.choice([-0.5, 0.5], n)
     return np.asarray(_turned(inside * np.array([0.7, 0.5, 0.8]) * extent, rng.uniform(0, np.pi)))
 
 
 def _sphere(n: int, extent: float, rng: np.random.Generator) -> FloatArray:
-    """Draw points of a sphere."""
+    """Draw points on a sphere."""
     directions = rng.standard_normal((n, 3))
     return np.asarray(0.3 * extent * directions / np.linalg.norm(directions, axis=1, keepdims=True))

@@ -1,4 +1,4 @@
-"""All trials of a figure, over processes; and what they say."""
+"""Run all trials of a figure in several processes, and summarise them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ QUANTITIES = ("angle_deg", "offset", "radius_percent", "seconds")
 
 
 class Task(NamedTuple):
-    """A trial to be run.
+    """A trial to run.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class Task(NamedTuple):
 
 
 class Summary(NamedTuple):
-    """What the trials of a cell say.
+    """The summary of the trials of a cell.
 
     Parameters
     ----------
@@ -44,11 +44,11 @@ class Summary(NamedTuple):
     trials : int
         Number of trials.
     found : float
-        Cylinders found, the mean.
+        Mean number of cylinders found.
     means, errors : tuple of float
         Means of the four quantities over the trials that have them, and their standard errors; NaN without any.
     bound : tuple of float or None
-        Least mean of the first three, where it is known.
+        Least mean of the first three, if known.
     """
 
     cell: Cell
@@ -60,18 +60,18 @@ class Summary(NamedTuple):
 
 
 def tasks_of(figure: Figure, trials: int, done: Trials) -> list[Task]:
-    """Give the trials of a figure that are not done, all cells' first trials first."""
+    """Return the missing trials of a figure, the first trials of all cells first."""
     return [Task(cell, trial) for trial in range(trials) for cell in figure.cells if Key.of(cell, trial) not in done]
 
 
 def run_tasks(tasks: list[Task], jobs: int, scan: ObjectScan | None) -> Iterator[tuple[Key, Outcome]]:
-    """Run trials, in their order, over several processes.
+    """Run trials in their order in several processes.
 
     Parameters
     ----------
     tasks : list of Task
     jobs : int
-        Processes; the outcomes do not depend on it, but for the seconds.
+        Number of processes; the outcomes do not depend on it, except for the seconds.
     scan : ObjectScan or None
         For figures that need one.
 
@@ -96,7 +96,7 @@ def run_tasks(tasks: list[Task], jobs: int, scan: ObjectScan | None) -> Iterator
 
 
 def summarize(figure: Figure, trials: Trials) -> list[Summary]:
-    """Put the trials of each cell together.
+    """Summarise the trials of each cell.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def summarize(figure: Figure, trials: Trials) -> list[Summary]:
 
 
 def bound_of(figure: Figure, cell: Cell) -> tuple[float, ...] | None:
-    """Give the least mean errors of a cell, of figures that measure errors of one synthetic cylinder."""
+    """Return the least mean errors of a cell, for figures that measure errors of one synthetic cylinder."""
     if figure.kind != "cylinder":
         return None
     scene = dict(cell.scene)
@@ -139,7 +139,7 @@ _worker: dict[str, ObjectScan | None] = {}
 
 
 def _start_worker(scan: ObjectScan | None) -> None:
-    """Prepare a process; the one that started it sees to Ctrl-C."""
+    """Prepare a process; its parent handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     _worker["scan"] = scan
 
@@ -150,7 +150,7 @@ def _work(task: Task) -> Outcome:
 
 @contextmanager
 def _single_threaded() -> Iterator[None]:
-    """Let processes started meanwhile use one thread each for linear algebra and normals: they are as many as cores."""
+    """Make processes started meanwhile use one thread for linear algebra and normals, as there is one per core."""
     names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
     before = {name: os.environ.get(name) for name in names}
     os.environ.update(dict.fromkeys(names, "1"))

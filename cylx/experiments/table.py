@@ -1,4 +1,4 @@
-"""The trials of a figure as a CSV file that grows: what is in it is not run again."""
+"""The trials of a figure as a CSV file to which trials are added; trials in it are not run again."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ COLUMNS = ("panel", "curve", "x", "trial", "found", "angle_deg", "offset", "radi
 
 
 class Key(NamedTuple):
-    """Which trial of a figure.
+    """The identity of a trial of a figure.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class Key(NamedTuple):
 
     @classmethod
     def of(cls, cell: Cell, trial: int) -> Key:
-        """Name a trial of a cell."""
+        """Return the key of a trial of a cell."""
         return cls(cell.panel, cell.curve, float(cell.x), trial)
 
 
@@ -39,19 +39,19 @@ Trials = dict[Key, Outcome]
 
 
 def parse_trials(text: str, made_by: str | None = __version__) -> Trials | None:
-    """Read the trials of this version of cylx; a line that was cut off, or was made by another, is passed over.
+    """Parse the trials of this version of cylx; incomplete lines and lines of other versions are skipped.
 
     Parameters
     ----------
     text : str
-        Of the file.
+        Text of the file.
     made_by : str or None
-        What made the trials that count; None for any.
+        Version (and scan) of the trials to read; None for any.
 
     Returns
     -------
     dict of Key to Outcome, or None
-        None if it is no such file.
+        None if it is not such a file.
     """
     try:
         header, *rows = csv.reader(io.StringIO(text)) if text else [COLUMNS]
@@ -73,12 +73,12 @@ def parse_trials(text: str, made_by: str | None = __version__) -> Trials | None:
 
 
 def header_line() -> str:
-    """Give the first line of the file."""
+    """Return the first line of the file."""
     return ",".join(COLUMNS) + "\n"
 
 
 def trial_lines(trials: Iterable[tuple[Key, Outcome]], made_by: str = __version__) -> str:
-    """Give the lines of some trials, made by this version of cylx or with some scan; not measured is empty."""
+    """Return the lines of some trials, made by this version of cylx or with some scan; unknown values are empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     for key, outcome in trials:

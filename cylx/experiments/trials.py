@@ -1,4 +1,4 @@
-"""One trial: a scene is made, a method finds its cylinders, and what it got wrong is measured."""
+"""Run one trial: make a scene, find its cylinders by a method, and measure the errors."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ DISTANCE, NEIGHBOURHOOD = 0.0144, 0.286
 
 
 class Outcome(NamedTuple):
-    """What a trial came to.
+    """The outcome of a trial.
 
     Parameters
     ----------
     found : int
-        Cylinders found of those that there are.
+        Number of true cylinders that were found.
     angle_deg : float
-        Of the axis to the true one, or of two axes to each other, degrees; NaN if they were not found.
+        Angle between the axis and the true one, or between two axes, degrees; NaN if they were not found.
     offset : float
         Distance of the cylinder's true middle from the axis, radii; NaN if it was not measured.
     radius_percent : float
         Error of the radius, percent; NaN if it was not measured.
     seconds : float
-        Of the extraction.
+        Time of the extraction.
     """
 
     found: int
@@ -77,12 +77,12 @@ def run_trial(cell: Cell, trial: int, scan: ObjectScan | None) -> Outcome:
 
 @lru_cache
 def _seen_from(scan: ObjectScan, view_deg: float, side: float) -> ObjectScan:
-    """Remember what is seen, because its normals take seconds; scans are compared by identity."""
+    """Return the visible part of a scan; cached, as its normals take seconds. Scans are compared by identity."""
     return scan.seen_from(view_deg, side)
 
 
 def config_of(cell: Cell, trial: int, *, most: int, extent: float | None = None) -> Config:
-    """Put the configuration of a trial together.
+    """Build the configuration of a trial.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ def config_of(cell: Cell, trial: int, *, most: int, extent: float | None = None)
     trial : int
         Seed.
     most : int
-        Cylinders there are. The default method is not told.
+        Number of cylinders in the scene; not given to the default method.
     extent : float, optional
-        Of the scanned object, which the distances of the competitors are shares of.
+        Extent of the scanned object; the distances of the competitors are shares of it.
     """
     if cell.method == "auto":
         return load_config(overrides=cell.settings, options={"seed": trial})
@@ -111,7 +111,7 @@ def _timed(points: FloatArray, config: Config) -> tuple[Extraction, float]:
 
 
 def _single_outcome(true: Cylinder, found: Extraction, seconds: float) -> Outcome:
-    """Measure the cylinder with the most points, which is the first one but for their confidence."""
+    """Measure the cylinder with the most points; the order of the result is by confidence."""
     if not found.cylinders:
         return Outcome(0, np.nan, np.nan, np.nan, seconds)
     shape = max(found.cylinders, key=lambda fit: fit.inliers).cylinder
@@ -137,5 +137,5 @@ def _cans_outcome(centers: FloatArray, found: Extraction, seconds: float) -> Out
 
 
 def _angle_deg(u: FloatArray, v: FloatArray) -> float:
-    """Give the angle between two axes, degrees."""
+    """Return the angle between two axes, degrees."""
     return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(u, v)), abs(float(u @ v)))))

@@ -1,7 +1,7 @@
-"""Cylinders for other programs: meshes, tables and CAD files, one file a family of formats.
+"""Export of cylinders to other programs: meshes, tables and CAD files, one file per family of formats.
 
-Each `write` takes a `Drawing` and gives the bytes of a file; the same drawing gives the same bytes. The libraries that
-write the formats are extras, imported when they are needed.
+Each `write` takes a `Drawing` and returns the bytes of a file; the same drawing gives the same bytes. The libraries
+for the formats are extras, imported on demand.
 """
 
 from __future__ import annotations

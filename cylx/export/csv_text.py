@@ -1,4 +1,4 @@
-"""CSV: one line a cylinder, a column for each number; no extra is needed."""
+"""CSV: one line per cylinder, one column per number; needs no extra."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cylx.results.table import table_of
 
 
 def write(drawing: Drawing, suffix: str) -> Exported:
-    """Write the table of the cylinders, comma-separated, with their names of columns first; empty is unknown.
+    """Write the table of the cylinders, comma-separated, with a header line; unknown values are empty.
 
     Parameters
     ----------

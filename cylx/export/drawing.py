@@ -1,4 +1,4 @@
-"""What is exported: the cylinders of a result as shapes, with a name and a colour each."""
+"""The cylinders of a result as shapes to export, each with a name and a colour."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cylx.results import ResultCylinder
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Piece:
-    """A finite cylinder to be drawn.
+    """A finite cylinder to draw.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Piece:
     color : tuple of int
         Red, green and blue, 0 to 255.
     found : ResultCylinder
-        What the result says of it.
+        Its entry in the result.
     """
 
     id: int
@@ -36,22 +36,22 @@ class Piece:
 
     @property
     def name(self) -> str:
-        """What it is called where a format has names."""
+        """Its name in formats with names."""
         return f"cylinder {self.id}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drawing:
-    """All that goes into a file.
+    """The content of a file.
 
     Parameters
     ----------
     cylinders : tuple of ResultCylinder
-        As the result has them.
+        The cylinders of the result.
     pieces : tuple of Piece
-        Those of them that have a height.
+        The cylinders that have a height.
     unit : str or None
-        Unit of the scan, a key of `METRES`; None if it was not said.
+        Unit of the scan, a key of `METRES`; None if unknown.
     """
 
     cylinders: tuple[ResultCylinder, ...]
@@ -67,13 +67,13 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exported:
-    """The bytes of a file, and what its reader has to know.
+    """The bytes of a file, with a remark for its reader.
 
     Parameters
     ----------
     data : bytes
     offset : tuple of float or None
-        What was taken off all coordinates, scene units; None if they are as in the scan.
+        Offset subtracted from all coordinates, scene units; None if they are as in the scan.
     """
 
     data: bytes

@@ -15,7 +15,7 @@ _UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6}  # $INSUNITS
 def write(drawing: Drawing, suffix: str) -> Exported:
     """Write a DXF file (R2010) with a line from end to end of each cylinder, in its colour.
 
-    Extended data of the application `CYLX` have the number (1071) and the radius (1041, a distance) of each.
+    Extended data of the application `CYLX` hold the number (1071) and the radius (1041, a distance) of each.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
         document.header["$MEASUREMENT"] = int(drawing.unit not in {"in", "ft"})
         classes = document.classes
         classes.add_required_classes(document.dxfversion)
-        classes.classes = dict(sorted(classes.classes.items()))  # they come out of a set
+        classes.classes = dict(sorted(classes.classes.items()))  # ezdxf takes them from a set, in random order
         document.layers.add(LAYER)
         document.appids.add(APPLICATION)
         space = document.modelspace()
@@ -52,7 +52,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
 
 
 def _named(text: str) -> str:
-    """Put names made of the content where those of all files would be the same."""
+    """Insert names made of the content where they would be the same for all files."""
     content = uuid.uuid5(uuid.NAMESPACE_OID, text)
     for key in ("$FINGERPRINTGUID", "$VERSIONGUID"):
         before, found, rest = text.partition(f"  9\n{key}\n  2\n")

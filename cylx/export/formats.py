@@ -1,4 +1,4 @@
-"""The formats by their suffixes: what writes each, which extra that takes, and whether it has a unit."""
+"""The export formats by suffix: the module that writes each, the extra it needs, and whether it has a unit."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048}
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format that cylinders can be written in.
+    """A format for cylinders.
 
     Parameters
     ----------
     suffix : str
-        With its dot, in small letters.
+        With its dot, in lower case.
     home : str
-        Module of this room that writes it.
+        Module of this package that writes it.
     library : str or None
-        What it needs; None if that comes with cylx.
+        Library that it needs; None if that is installed with cylx.
     has_unit : bool
-        Whether lengths have a unit in it.
+        Whether its lengths have a unit.
     may_be_empty : bool
-        Whether a file without any cylinder can be read.
+        Whether a file without cylinders is valid.
     """
 
     suffix: str
@@ -46,7 +46,7 @@ class Format:
         return None if self.library is None else LIBRARIES[self.library].extra
 
     def demand(self, place: str, unit: str | None) -> None:
-        """Refuse what cannot be written: its library or the unit is missing.
+        """Check that the library is installed and the unit is given.
 
         Parameters
         ----------
@@ -84,7 +84,7 @@ FORMATS = {
 
 
 def format_of(name: str) -> Format:
-    """Tell the format of a file by its suffix.
+    """Return the format of a file by its suffix.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def format_of(name: str) -> Format:
     """
     suffix = PurePath(name).suffix.lower()
     if suffix not in FORMATS:
-        fault = f"{suffix} is no format that is known" if suffix else "has no suffix that names a format"
+        fault = f"{suffix} is not a known format" if suffix else "has no suffix that names a format"
         raise UsageError(name, fault, f"use one of {', '.join(FORMATS)}")
     return FORMATS[suffix]
 
@@ -116,7 +116,7 @@ def render(drawing: Drawing, known: Format, place: str) -> Exported:
     Raises
     ------
     OutputError
-        If there is nothing to write, and the format has no way to say so.
+        If there is nothing to write, and a file of the format cannot be empty.
     UsageError
         If the library that writes it is not installed.
     """

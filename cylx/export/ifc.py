@@ -19,8 +19,8 @@ _NO_TIME = "1970-01-01T00:00:00"
 def write(drawing: Drawing, suffix: str) -> Exported:
     """Write an IFC4 file with an `IfcPipeSegment` for each cylinder, in the unit of the scan.
 
-    Each is placed where its cylinder starts, its z axis along that of the cylinder; the property set `cylx` has its
-    number, its radius, and what is known of how certain it is. Identifiers are made of the content.
+    Each is placed at the start of its cylinder, with its z axis along the cylinder. The property set `cylx` has its
+    number, its radius, and its confidence and uncertainty. Identifiers are made of the content.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
 
 
 class _Model:
-    """A file that grows.
+    """A file under construction.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class _Model:
             self.root("IfcRelContainedInSpatialStructure", "scan", RelatedElements=segments, RelatingStructure=building)
 
     def text(self) -> str:
-        """Give the file, without the time it was written at."""
+        """Return the file, without the time of writing."""
         header = self.file.header
         header.file_description.description = ("ViewDefinition [ReferenceView]",)
         header.file_name.name = "cylx"
@@ -126,14 +126,14 @@ class _Model:
         return segment
 
     def paint(self, solid: object, piece: Piece) -> None:
-        """Give a solid its colour."""
+        """Set the colour of a solid."""
         color = self.make("IfcColourRgb", None, *(part / 255 for part in piece.color))
         shading = self.make("IfcSurfaceStyleShading", color, 0.0)
         style = self.make("IfcSurfaceStyle", piece.name, "BOTH", [shading])
         self.make("IfcStyledItem", solid, [style])
 
     def describe(self, segment: object, piece: Piece) -> None:
-        """Say in properties what the result says of a cylinder."""
+        """Add the values of a cylinder's result as properties."""
         found = piece.found
         values: dict[str, tuple[str, object]] = {
             "id": ("IfcInteger", piece.id),

@@ -1,7 +1,7 @@
 """PLY, OBJ, GLB and STL: triangle meshes of the finite cylinders with their caps, by trimesh.
 
-A cylinder is a prism of `SIDES` sides whose edges lie on its surface: nowhere is it further from the surface than 0.9 %
-of the radius.
+A cylinder is a prism of `SIDES` sides whose edges lie on its surface: its distance from the surface is at most 0.9 % of
+the radius.
 """
 
 from __future__ import annotations
@@ -24,17 +24,18 @@ if TYPE_CHECKING:
 SIDES = 24
 """1 - cos(pi / 24) is 0.0086 of the radius."""
 COARSEST = 1e-3
-"""Where single precision would move a corner by more than this part of the smallest radius, an offset is taken off."""
+"""An offset is subtracted if single precision would move a corner by more than this share of the smallest radius."""
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
-"""Turns the z axis of a scan to the y axis, which is up in glTF."""
+"""Rotates the z axis of a scan to the y axis, which is up in glTF."""
 
 
 def write(drawing: Drawing, suffix: str) -> Exported:
     """Write the meshes of the cylinders.
 
-    PLY and OBJ colour the corners, GLB gives each cylinder a material. PLY says whose a corner is by `cylinder_id`,
-    OBJ and GLB name each cylinder. GLB is in metres, and turned so that the z axis of the scan is up. PLY and STL have
-    coordinates in single precision: far from the origin a whole number is taken off each, and told of in the header.
+    PLY and OBJ colour the corners, GLB gives each cylinder a material. PLY has the cylinder of a corner in
+    `cylinder_id`, OBJ and GLB name each cylinder. GLB is in metres, and rotated so that the z axis of the scan is up.
+    PLY and STL have coordinates in single precision: far from the origin, integers are subtracted from them and written
+    to the header.
 
     Parameters
     ----------
@@ -57,12 +58,12 @@ def write(drawing: Drawing, suffix: str) -> Exported:
 
 
 def mesh_of(cylinder: Cylinder) -> tuple[FloatArray, IndexArray]:
-    """Give the corners and triangles of a closed prism about the middle of a cylinder, seen from outside.
+    """Return the corners and triangles of a closed prism about the middle of a cylinder, seen from outside.
 
     Returns
     -------
     corners : ndarray of shape (2 SIDES + 2, 3)
-        From the middle of the cylinder; the last two are the middles of the caps.
+        Relative to the middle of the cylinder; the last two are the middles of the caps.
     triangles : ndarray of shape (4 SIDES, 3)
         Indices of corners, counterclockwise.
     """
@@ -86,12 +87,12 @@ def mesh_of(cylinder: Cylinder) -> tuple[FloatArray, IndexArray]:
 
 
 def offset_for_singles(shapes: list[Cylinder]) -> tuple[float, float, float] | None:
-    """Give what has to be taken off the coordinates before they fit into single precision, None if they do.
+    """Return the offset to subtract from the coordinates so that they fit into single precision; None if they fit.
 
     Returns
     -------
     tuple of float or None
-        Whole numbers.
+        Integers.
     """
     points = np.array([shape.point for shape in shapes])
     if np.abs(points).max() * 2.0**-24 <= COARSEST * min(shape.radius for shape in shapes):
@@ -101,7 +102,7 @@ def offset_for_singles(shapes: list[Cylinder]) -> tuple[float, float, float] | N
 
 
 def _one_mesh(drawing: Drawing, offset: tuple[float, float, float] | None) -> Trimesh:
-    """Join all cylinders, less an offset."""
+    """Join all cylinders, with an offset subtracted."""
     from trimesh import Trimesh  # noqa: PLC0415  an extra
 
     away = np.zeros(3) if offset is None else np.array(offset)
@@ -122,7 +123,7 @@ def _one_mesh(drawing: Drawing, offset: tuple[float, float, float] | None) -> Tr
 
 
 def _obj(drawing: Drawing) -> bytes:
-    """Write a text with an object a cylinder, in the unit of the scan, to a millionth of the smallest radius."""
+    """Write a text with one object per cylinder, in the unit of the scan, to a millionth of the smallest radius."""
     from trimesh import Scene, Trimesh  # noqa: PLC0415  an extra
 
     scene = Scene()
@@ -139,7 +140,7 @@ def _obj(drawing: Drawing) -> bytes:
 
 
 def _glb(drawing: Drawing) -> bytes:
-    """Write a binary glTF with a node a cylinder; its place is in the node, so that nothing is rounded far away."""
+    """Write a binary glTF with one node per cylinder; the node has its position, which avoids rounding far away."""
     from trimesh import Scene  # noqa: PLC0415  an extra
 
     scene, scale = Scene(), METRES[drawing.unit or "m"]
@@ -153,7 +154,7 @@ def _glb(drawing: Drawing) -> bytes:
 
 
 def _colored(piece: Piece, scale: float) -> Trimesh:
-    """Give the mesh of one cylinder about its middle, with a material of its colour."""
+    """Return the mesh of one cylinder about its middle, with a material of its colour."""
     from trimesh import Trimesh  # noqa: PLC0415  an extra
     from trimesh.visual import TextureVisuals  # noqa: PLC0415  an extra
     from trimesh.visual.material import PBRMaterial  # noqa: PLC0415  an extra
@@ -165,5 +166,5 @@ def _colored(piece: Piece, scale: float) -> Trimesh:
 
 
 def _linear(part: float) -> float:
-    """Turn a part of an sRGB colour into light, as glTF wants it."""
+    """Convert a component of an sRGB colour to linear light, as glTF requires."""
     return float(part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4)

@@ -32,12 +32,12 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     from OCP.XCAFDoc import XCAFDoc_DocumentTool  # noqa: PLC0415  an extra
 
     for printer in Message.DefaultMessenger_s().Printers():
-        printer.SetTraceLevel(Message_Gravity.Message_Fail)  # it writes statistics to standard output
+        printer.SetTraceLevel(Message_Gravity.Message_Fail)  # otherwise it writes statistics to standard output
     unit = drawing.unit or "m"
     document = TDocStd_Document(TCollection_ExtendedString("cylx"))
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, METRES[unit])
     labels = [_add(document, piece) for piece in drawing.pieces]
-    STEPControl_Controller.Init_s()  # before it there is no unit to be set
+    STEPControl_Controller.Init_s()  # the unit can only be set after this
     before = Interface_Static.CVal_s("write.step.unit")
     if not Interface_Static.SetCVal_s("write.step.unit", unit.upper()):
         raise RuntimeError(f"Open CASCADE does not know the unit {unit}")
@@ -45,7 +45,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
         writer = STEPCAFControl_Writer()
         writer.SetColorMode(True)
         writer.SetNameMode(True)
-        for label in labels:  # all at once their colours come in any order
+        for label in labels:  # one by one: all at once their colours come in any order
             writer.Transfer(label, STEPControl_StepModelType.STEPControl_AsIs)
         stream = io.BytesIO()
         writer.WriteStream(stream)
@@ -58,7 +58,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
 
 
 def _add(document: Any, piece: Piece) -> Any:  # noqa: ANN401  OCP has no types
-    """Put a cylinder into a document and give its label."""
+    """Add a cylinder to a document and return its label."""
     from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder  # noqa: PLC0415  an extra
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt  # noqa: PLC0415  an extra
     from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor  # noqa: PLC0415  an extra

@@ -1,1 +1,1 @@
-"""Fits of a cylinder to points, and what they say of its uncertainty."""
+"""Fits of a cylinder to points, with their uncertainty."""

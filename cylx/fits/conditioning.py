@@ -1,4 +1,4 @@
-"""What the knowledge of a radius says of the rest of a cylinder that was fitted without it."""
+"""Update a cylinder that was fitted without knowledge of its radius when the radius becomes known."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ def given_radius(
 ) -> tuple[FloatArray, FloatArray]:
     """Condition a fitted cylinder on its radius: the mean and covariance of a Gaussian, given one more observation.
 
-    With the covariance C and c its last column, the parameters move by c (R - r) / (C_rr + t^2), and c c^T over the
-    same goes off the covariance.
+    With the covariance C and its last column c, the parameters change by c (R - r) / (C_rr + t^2), and c c^T divided by
+    the same is subtracted from the covariance.
 
     Parameters
     ----------
     model : ndarray of shape (7,)
         A point of the axis, its unit direction, the radius r. Not changed.
     covariance : ndarray of shape (5, 5)
-        C, as `cylx.fits.likelihood.MixtureFit` has it.
+        C, as in `cylx.fits.likelihood.MixtureFit`.
     radius : float
-        R, the unit of the model.
+        R, in the unit of the model.
     deviation : float
         t, its standard deviation, > 0.
 

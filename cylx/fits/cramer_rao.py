@@ -1,4 +1,4 @@
-"""The Cramér-Rao bound: how exactly the noise lets anyone know a cylinder."""
+"""The Cramér-Rao bound: the smallest error of a cylinder for a given noise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cylx.geometry.arrays import FloatArray
 
 
 def outlier_information(sigma: float, sigma_o: float, p: float) -> float:
-    """Give what noise with outliers tells of a location, as a share of what Gaussian noise would.
+    """Return the Fisher information of noise with outliers about a location, relative to Gaussian noise.
 
     Parameters
     ----------
@@ -42,9 +42,9 @@ def outlier_information(sigma: float, sigma_o: float, p: float) -> float:
 
 
 def covariance_bound(points: int, height: float, theta: float, sigma: float, information: float = 1.0) -> FloatArray:
-    """Give the bound on the covariance of a cylinder of unit radius, from points even over an arc and its height.
+    """Return the bound on the covariance of a cylinder of unit radius, from points even over an arc and its height.
 
-    A point at angle phi and height z tells of (cos phi, sin phi, z cos phi, z sin phi, 1) times the parameters, with
+    A point at angle phi and height z measures (cos phi, sin phi, z cos phi, z sin phi, 1) times the parameters, with
     noise sigma.
 
     Parameters
@@ -52,7 +52,7 @@ def covariance_bound(points: int, height: float, theta: float, sigma: float, inf
     points : int
         Number of points, > 0.
     height : float
-        Radii, > 0.
+        In radii, > 0.
     theta : float
         Arc, about the first axis, radians, in (0, 2 pi].
     sigma : float
@@ -63,7 +63,7 @@ def covariance_bound(points: int, height: float, theta: float, sigma: float, inf
     Returns
     -------
     ndarray of shape (5, 5)
-        Of the offset along the view, the offset across, two tilts (radians) and the radius.
+        Of the offset along the view, the offset across it, two tilts (radians) and the radius.
     """
     mean_cos = np.sin(theta / 2) / (theta / 2)
     cos_cos = (1 + np.sin(theta) / theta) / 2
@@ -75,7 +75,7 @@ def covariance_bound(points: int, height: float, theta: float, sigma: float, inf
 
 
 def mean_length(covariance: FloatArray) -> float:
-    """Give the mean length of a Gaussian vector in the plane: sqrt(pi/2) times the mean deviation over directions.
+    """Return the mean length of a Gaussian vector in the plane: sqrt(pi/2) times the mean deviation over directions.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ def mean_length(covariance: FloatArray) -> float:
 def mean_errors_at_bound(
     points: int, height: float, theta: float, sigma: float, sigma_o: float, p: float
 ) -> tuple[float, float, float]:
-    """Give the least mean errors: of the axis in degrees, of its place in radii, of the radius in percent.
+    """Return the least mean errors: of the axis in degrees, of its position in radii, of the radius in percent.
 
     Parameters
     ----------
     points : int
         Number of points, > 0.
     height : float
-        Radii, > 0.
+        In radii, > 0.
     theta : float
         Arc, radians, in (0, 2 pi].
     sigma, sigma_o : float

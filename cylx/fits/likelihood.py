@@ -1,9 +1,9 @@
-"""Maximum-likelihood fit of a cylinder to points of which a share scatters more widely than the rest.
+"""Maximum-likelihood fit of a cylinder to points with outliers, which have a larger scatter.
 
-The residuals are taken for a mixture of two Gaussians (`cylx.fits.residual_law`), whose shares and widths are
-estimated with the cylinder. Gauss-Newton steps solve the normal equations of the points weighted by what either part
-makes of them. So the Cramer-Rao bound is reached, and the covariance is that of an M-estimator (Huber, 1967), which
-stays true where the residuals are no such mixture.
+The residuals are modelled by a mixture of two Gaussians (`cylx.fits.residual_law`), whose shares and widths are
+estimated together with the cylinder. Gauss-Newton steps solve the normal equations, with weights of the points from
+the mixture. The fit reaches the Cramer-Rao bound. Its covariance is that of an M-estimator (Huber, 1967), which holds
+even if the residuals are not such a mixture.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from cylx.geometry.numerics import fill_basis
 
 MIXTURE_ROUNDS, STEPS_A_ROUND = 3, 5
 CLOSE = 1e-4
-"""Steps end when one is shorter than this share of the deviation."""
+"""The iteration ends when a step is shorter than this share of the standard deviation."""
 LEAST_POINTS_OF_MIXTURE = 12
 CONTRADICTION = 5.0
-"""What is known and what the points say may differ by so many standard deviations."""
+"""A prior contradicts the points if they differ by more standard deviations than this."""
 _LOWER = np.tril_indices(5, -1)
 ONE_SIDED = 25.0
-"""Chi-square of five degrees of freedom beyond which the outliers lie to one side, and tell nothing of the surface."""
+"""Above this chi-square (five degrees of freedom) the outliers lie on one side and say nothing about the surface."""
 
 
 class MixtureFit(NamedTuple):
@@ -36,7 +36,7 @@ class MixtureFit(NamedTuple):
     Parameters
     ----------
     model : ndarray of shape (7,)
-        A point of the axis, its unit direction, and the radius, freed of its bias.
+        A point of the axis, its unit direction, and the radius, corrected for its bias.
     covariance : ndarray of shape (5, 5)
         Of two offsets of the axis at its point, its two tilts (radians), and the radius. The first offset and tilt are
         along the first of the two directions of `fill_basis`, the others along the second.
@@ -49,17 +49,17 @@ class MixtureFit(NamedTuple):
 
 
 class Prior(NamedTuple):
-    """What is known of a cylinder before its points are looked at, as Gaussians.
+    """Prior knowledge of a cylinder, as Gaussians.
 
     Parameters
     ----------
     radius : float or None
-        None if nothing is known of it.
+        None if unknown.
     radius_deviation : float
     direction : ndarray of shape (3,) or None
-        Unit direction of the axis, either way; None if nothing is known of it.
+        Unit direction of the axis, up to sign; None if unknown.
     direction_deviation : float
-        Of each of the two tilts, radians.
+        Standard deviation of each of the two tilts, radians.
     """
 
     radius: float | None = None
@@ -68,7 +68,7 @@ class Prior(NamedTuple):
     direction_deviation: float = math.inf
 
     def as_far_as_borne_out(self, fit: MixtureFit) -> Prior | None:
-        """Leave out what a fit without it contradicts by `CONTRADICTION` standard deviations; None if that is all."""
+        """Drop the parts that contradict a fit without the prior (see `CONTRADICTION`); return None if all do."""
         covariance, kept = fit.covariance, self
         if self.radius is not None:
             away = fit.model[RADIUS] - self.radius
@@ -102,18 +102,18 @@ def fit_mixture(
     model : ndarray of shape (7,)
         Start: a point of the axis, its unit direction, the radius. Not changed.
     low, high : float
-        Only points whose height from the model's point lies between these take part.
+        Only points are used whose height from the model's point lies between these.
     width : float
-        Only points this near to the surface take part: a few deviations of the surface.
+        Only points this near to the surface are used: a few standard deviations of the surface.
     deviation : float
-        Standard deviation of the surface, to start with.
+        Initial standard deviation of the surface.
     prior : Prior, optional
-        Makes of the likelihood a posterior: the fit is its mode.
+        Prior; the fit is then the mode of the posterior.
 
     Returns
     -------
     MixtureFit or None
-        None if fewer than a dozen points take part, or the fit breaks down or leaves its start by more than `width`.
+        None if there are fewer than a dozen points, or the fit fails or moves from its start by more than `width`.
     """
     fitted = np.array(model, dtype=np.float64)
     points = np.ascontiguousarray(points)
@@ -154,7 +154,7 @@ class _Sums:
     normal, right : ndarray of shape (5, 5), (5,)
         The weighted normal equations.
     slopes, scores, outer_scores : ndarray of shape (5, 5)
-        Of the derivative of the score, and of the squares of the score and of that of the outliers.
+        Sums of the derivative of the score, of the squares of the score, and of the squares of the outliers' score.
     outer_right : ndarray of shape (5,)
         Score of the outliers.
     count, weight, reach : float
@@ -179,7 +179,7 @@ class _Sums:
         *,
         full: bool = False,
     ) -> _Sums:
-        """Sum over the points; with all that the covariance takes if `full`."""
+        """Sum over the points; with `full`, include the sums for the covariance."""
         self = cls(max(abs(low), abs(high)))
         matrices = np.zeros((4, 5, 5))
         vectors = np.zeros((3, 5))
@@ -193,10 +193,10 @@ class _Sums:
         return self
 
     def know(self, prior: Prior, model: FloatArray) -> None:
-        """Add what is known to the normal equations: a pseudo-observation of the radius, one of each tilt."""
+        """Add a prior to the normal equations: a pseudo-observation of the radius and one of each tilt."""
         values, precisions = np.zeros(5), np.zeros(5)
         if prior.radius is not None:
-            biased = prior.radius + self.count / self.weight / (2.0 * model[RADIUS])  # as a fit to noisy points has it
+            biased = prior.radius + self.count / self.weight / (2.0 * model[RADIUS])  # the bias of a fit to noise
             values[4], precisions[4] = biased - model[RADIUS], prior.radius_deviation**-2
         if prior.direction is not None:
             direction = prior.direction * np.sign(prior.direction @ model[DIRECTION])
@@ -207,12 +207,12 @@ class _Sums:
             matrix[np.diag_indices(5)] += precisions
 
     def one_sidedness(self) -> float:
-        """Give chi-square of five degrees of freedom of the outliers about the surface."""
+        """Return chi-square, with five degrees of freedom, of the outliers about the surface."""
         scores = self.outer_scores + 1e-9 * np.trace(self.outer_scores) * np.eye(5)
         return float(self.outer_right @ np.linalg.lstsq(scores, self.outer_right, rcond=None)[0])
 
     def covariance(self) -> FloatArray | None:
-        """Give the covariance of an M-estimator, for heights in units of length; None if it is not determined."""
+        """Return the covariance of an M-estimator, for heights in units of length; None if it is not determined."""
         try:
             inverse = np.linalg.inv(self.slopes)
         except np.linalg.LinAlgError:
@@ -225,7 +225,7 @@ class _Sums:
 
 
 def _advance(model: FloatArray, sums: _Sums) -> float:
-    """Move a model by a step, and give how far at its ends; infinity if there is none."""
+    """Move a model by a step, and return the displacement at its ends; infinity if there is no step."""
     try:
         step = np.linalg.solve(sums.normal, sums.right)
     except np.linalg.LinAlgError:
@@ -244,7 +244,7 @@ def _advance(model: FloatArray, sums: _Sums) -> float:
 def _count_residuals(
     points: FloatArray, model: FloatArray, low: float, high: float, width: float, counts: FloatArray
 ) -> None:
-    """Count absolute residuals in equal steps up to `width`, which the entries stand in the middle of."""
+    """Count absolute residuals in equal steps up to `width`; the entries are at the middles of the steps."""
     for i in range(len(points)):
         z, square = 0.0, 0.0
         for d in range(3):
@@ -253,7 +253,7 @@ def _count_residuals(
             square += offset * offset
         residual = abs(math.sqrt(max(square - z * z, 0.0)) - model[RADIUS])
         if low <= z <= high and residual < width:
-            # shared by the two nearest steps, so that rounding chooses nothing
+            # split between the two nearest steps, so that rounding makes no difference
             place = max(0.0, residual / width * len(counts) - 0.5)
             k = int(place)
             counts[k] += 1.0 - (place - k)
@@ -274,7 +274,7 @@ def _fill_sums(
     matrices: FloatArray,
     vectors: FloatArray,
 ) -> None:
-    """Fill what `_Sums` has; heights are in units of the reach."""
+    """Fill the sums of `_Sums`; heights are in units of the reach."""
     row = np.empty(5)
     for i in range(len(points)):
         dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]

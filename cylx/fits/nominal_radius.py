@@ -1,9 +1,10 @@
-"""Whether a radius is one of a catalogue of nominal radii, told by likelihood ratios.
+"""Decide by likelihood ratios whether a radius is one of a catalogue of nominal radii.
 
-Measured is a radius r with standard deviation s. If the object is of entry j, with nominal radius R_j and tolerance
-t_j, then r ~ N(R_j, s^2 + t_j^2). If it is of none, nothing is known of its radius but the scale: 1 / r is as likely on
-each octave, over the range of the catalogue and a factor of two on either side, so that r has the density 1 / (r L)
-with L = ln(4 max R / min R). Outside of that range the density goes on, so that what is far off finds no refuge.
+The measured radius is r with standard deviation s. If the object is of entry j, with nominal radius R_j and tolerance
+t_j, then r ~ N(R_j, s^2 + t_j^2). If it is of no entry, only the scale of its radius is known: 1 / r has the same
+probability in each octave, over the range of the catalogue and a factor of two on either side, so that r has the
+density 1 / (r L) with L = ln(4 max R / min R). The same density is used outside of that range, so that a radius far
+off is not assigned to an entry.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from typing import Literal, NamedTuple
 Decision = Literal["snapped", "ambiguous", "none"]
 
 DECISIVE = 20.0
-"""Least likelihood ratio of an entry to each of its rivals; against one that was as likely beforehand, the entry is
-right in 20 cases of 21."""
+"""Least likelihood ratio of an entry to each of its rivals. Against one rival of equal prior probability, the entry is
+then right in 20 cases of 21."""
 NEAR_IN_DEVIATIONS = 3.0
-"""Most standard deviations between a radius and the entry that it is taken for."""
+"""Most standard deviations between a radius and the entry that it is assigned to."""
 WIDER = 2.0
-"""What is of no entry may be so many times smaller or larger than all of them."""
+"""An object of no entry may be this many times smaller or larger than all entries."""
 EXACT = 1e-12
-"""No radius is known better than to this share of it: numbers are rounded."""
+"""No radius is known to better than this share of it, because numbers are rounded."""
 MOST_RATIO = 1e9
-"""Ratios are given up to this, and down to its inverse; beyond, they say nothing that they did not say before."""
+"""Ratios are limited to this and its inverse; more extreme values carry no further information."""
 
 
 class Catalogue(NamedTuple):
@@ -33,7 +34,7 @@ class Catalogue(NamedTuple):
     Parameters
     ----------
     radii : tuple of float
-        > 0, any unit; not empty.
+        In any unit, > 0; not empty.
     tolerances : tuple of float
         Standard deviation of true radii about each of them, > 0, same unit.
     """
@@ -44,20 +45,20 @@ class Catalogue(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """What the most likely entry near a radius is, and whether it is likely enough.
+    """The most likely entry near a radius, and whether it is likely enough.
 
     Parameters
     ----------
     decision : {'snapped', 'ambiguous', 'none'}
-        `snapped`: it is decisively more likely than every rival, and near. `none`: it is not near, or no more likely
-        than no entry at all. `ambiguous`: anything between.
+        `snapped`: it is near, and decisively more likely than every rival. `none`: it is not near, or no more likely
+        than no entry. `ambiguous`: anything between.
     entry : int
-        Its position in the catalogue; of the entry with the nearest radius if none is near.
+        Its index in the catalogue; the entry with the nearest radius if none is near.
     ratio : float
-        Of its likelihood to the greater one of its two rivals: the second entry, and no entry at all; in
+        Ratio of its likelihood to that of the stronger of its two rivals, the second entry and no entry; in
         [1 / `MOST_RATIO`, `MOST_RATIO`].
     radius, deviation : float
-        What was decided upon, in the unit of the catalogue.
+        The measured radius and its standard deviation, in the unit of the catalogue.
     """
 
     decision: Decision
@@ -68,12 +69,12 @@ class Choice:
 
 
 def choose_entry(radius: float, deviation: float, catalogue: Catalogue) -> Choice:
-    """Decide which entry of a catalogue a measured radius is of, if any.
+    """Decide to which entry of a catalogue a measured radius belongs, if any.
 
     Parameters
     ----------
     radius : float
-        > 0, the unit of the catalogue.
+        In the unit of the catalogue, > 0.
     deviation : float
         Its standard deviation, >= 0.
     catalogue : Catalogue
@@ -102,7 +103,7 @@ def choose_entry(radius: float, deviation: float, catalogue: Catalogue) -> Choic
     near = [i for i, z in enumerate(away) if z <= NEAR_IN_DEVIATIONS]
     if near:
         best = max(near, key=logs.__getitem__)
-    else:  # the likeliest one in the far tails is that of the largest tolerance, which nobody would look for
+    else:  # in the far tails the entry with the largest tolerance would be the most likely, which makes no sense
         best = min(range(len(logs)), key=lambda i: abs(math.log(radius) - math.log(catalogue.radii[i])))
     rival = max([nothing, *logs[:best], *logs[best + 1 :]])
     log_ratio = logs[best] - rival

@@ -1,4 +1,4 @@
-"""How residuals scatter: a mixture of two Gaussians, one of a surface and a broader one of outliers.
+"""The distribution of residuals: a mixture of two Gaussians, one of a surface and a broader one of outliers.
 
 The mixture is estimated by expectation maximisation (Dempster, Laird and Rubin, JRSS B 39, 1977) from a histogram, so
 that its cost does not grow with the points.
@@ -15,23 +15,23 @@ from numba import njit
 from cylx.geometry.arrays import FloatArray
 
 BINS = 240
-"""Steps of the residual in which its law and the weights are tabulated."""
+"""Steps of the residual in which the distribution and the weights are tabulated."""
 EM_STEPS = 40
 SETTLED = 1e-4
 """The estimate ends when a variance changes by less than this share."""
 LEAST_RATIO = 1.3
-"""An outlier part that is hardly broader than the other cannot be told from it."""
+"""The outliers must be this many times broader; otherwise the two parts cannot be separated."""
 
 
 class Law(NamedTuple):
-    """How residuals scatter.
+    """The distribution of residuals.
 
     Parameters
     ----------
     deviation, broad : float
         Standard deviations of the surface and of the outliers.
     share : float
-        Of outliers among the points, in [0, 1).
+        Share of outliers among the points, in [0, 1).
     """
 
     deviation: float
@@ -39,10 +39,10 @@ class Law(NamedTuple):
     share: float
 
     def weights(self, width: float, *, outliers: bool) -> FloatArray:
-        """Tabulate what a residual weighs, shape (BINS + 1, 3), at equal steps of its absolute value up to `width`.
+        """Tabulate the weight of a residual, shape (BINS + 1, 3), at equal steps of its absolute value up to `width`.
 
-        The columns are the weight, the derivative of the score (weight times residual), and what the outliers have in
-        the weight. Without `outliers`, what may be one weighs that much less, and nothing as an outlier.
+        The columns are the weight, the derivative of the score (weight times residual), and the outliers' part of the
+        weight. Without `outliers`, the outliers' part is left out of the first two columns.
         """
         squares = (width * np.arange(BINS + 1) / BINS) ** 2
         narrow, broad = self.deviation**2, self.broad**2
@@ -54,19 +54,19 @@ class Law(NamedTuple):
 
 
 def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:
-    """Estimate how residuals scatter by expectation maximisation.
+    """Estimate the distribution of residuals by expectation maximisation.
 
     Parameters
     ----------
     counts : ndarray of shape (BINS,)
-        How many there are, by absolute value, in equal steps up to `width`; they need not be whole.
+        Number of residuals by absolute value, in equal steps up to `width`; need not be integers.
     width : float
     start : Law
 
     Returns
     -------
     Law
-        Without outliers if the other part would not be broader by `LEAST_RATIO`.
+        Without outliers if the second part is less than `LEAST_RATIO` times as broad.
     """
     squares = (width * (np.arange(BINS) + 0.5) / BINS) ** 2
     total = float(counts.sum())
@@ -83,9 +83,9 @@ def estimate_law(counts: FloatArray, width: float, start: Law) -> Law:
 def _maximise(
     squares: FloatArray, counts: FloatArray, total: float, narrow: float, broad: float, share: float
 ) -> tuple[float, float, float]:
-    """Climb from these variances and this share of outliers to those that make the counts most likely."""
+    """Improve these variances and this share of outliers until the likelihood of the counts is largest."""
     for _ in range(EM_STEPS):
-        # the odds that a residual of this square is none
+        # the odds that a residual of this square is not an outlier
         ratio, rate = (1.0 - share) / share * math.sqrt(broad / narrow), 0.5 * (1.0 / narrow - 1.0 / broad)
         mass, outside, inside = 0.0, 0.0, 0.0
         for i in range(len(counts)):
@@ -103,7 +103,7 @@ def _maximise(
 
 
 def _posterior(squares: FloatArray, narrow: float, broad: float, share: float) -> FloatArray:
-    """Give the probability that residuals of these squares are outliers, from the two variances."""
+    """Return the probability that residuals of these squares are outliers, from the two variances."""
     if share <= 0.0:
         return np.zeros_like(squares)
     ratio = (1.0 - share) / share * math.sqrt(broad / narrow)

@@ -1,4 +1,4 @@
-"""The game that candidates play (sections 3.1 and 3.3): dynamics, payoff, and who agrees with a cylinder."""
+"""The clustering game (sections 3.1 and 3.3): dynamics, payoff, and agreement of candidates with a cylinder."""
 
 from cylx.game.dynamics import SparsePayoff, evolve
 from cylx.game.payoff import local_payoff, screw_payoff

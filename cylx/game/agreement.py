@@ -1,4 +1,4 @@
-"""What the candidates say of a cylinder: who agrees with it, of those that would have to."""
+"""Agreement of the candidates with a cylinder: how many of the nearby candidates agree."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.records import Candidates, Segment
 
 LEAST_TELLING_SHARE = 0.4
-"""Windows below this many radii see dents and rims of real objects rather than the cylinder; short ones need
-smaller."""
+"""Windows below this many radii see dents and rims of real objects rather than the cylinder. Short cylinders need
+smaller windows."""
 CONCENTRIC = 0.85
-"""A candidate on the same axis that is thinner or thicker than this is one of another surface."""
+"""A candidate on the same axis outside this ratio of radii belongs to another surface."""
 LIKE_RADIUS = 0.4
-"""A candidate so many times thinner or thicker is one of another thing, or of a detail: a rim, a dent, an edge."""
+"""A candidate outside this ratio of radii belongs to another object, or to a detail: a rim, a dent, an edge."""
 AGREEING = 0.15, math.cos(math.radians(6.0)), 0.1
 """A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
 
 
 def least_telling(segment: Segment) -> float:
-    """Give the radius from which a window can tell a cylinder."""
+    """Return the radius from which a window can identify a cylinder."""
     return float(LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half))
 
 
 class Neighbourhood:
-    """Candidates by place: finds those along a cylinder without looking at all.
+    """Spatial index of candidates: finds those along a cylinder without testing all.
 
     Parameters
     ----------
@@ -41,9 +41,9 @@ class Neighbourhood:
         self._windows = candidates.windows[self._order]
 
     def agreement(self, segment: Segment) -> tuple[int, int]:
-        """Count the windows inside a cylinder that agree with it, and all of them.
+        """Count the windows inside a cylinder that agree with it, and all windows inside it.
 
-        An edge of a beam borrows the few hypotheses that happen to agree; of a pipe's nearly all do.
+        At the edge of a beam a few candidates agree by chance; on a pipe nearly all do.
 
         Parameters
         ----------
@@ -63,7 +63,7 @@ class Neighbourhood:
     def agreeing(
         self, segment: Segment, alive: MaskArray, offset: float, angle_deg: float, radius: float
     ) -> IndexArray:
-        """Give those alive that agree with a cylinder along its height and a radius more: offset in radii, angle."""
+        """Return the remaining candidates that agree with a cylinder, up to a radius beyond its ends."""
         reach = segment.half + segment.radius
         part = self._beside(segment, reach)
         found = np.empty(part.stop - part.start, np.int64)
@@ -74,16 +74,16 @@ class Neighbourhood:
         return found[:n]
 
     def _beside(self, segment: Segment, reach: float) -> slice:
-        """Give those that a cylinder as long as this may hold."""
+        """Return the candidates within reach of a cylinder of this length."""
         x, width = float(segment.point[0]), abs(float(segment.direction[0])) * reach + segment.radius
         first, last = np.searchsorted(self._models[:, 0], [x - width, x + width])
         return slice(int(first), int(last))
 
 
 def is_contradicted(counts: tuple[int, int]) -> bool:
-    """Tell from the counts of `agreement` whether so many windows disagree that a fit would be in vain.
+    """Return whether so many windows disagree that a fit would be pointless, from the counts of `agreement`.
 
-    Of true cylinders nearly all windows agree, a third at the very least; a fifth is not reached by chance.
+    For true cylinders nearly all windows agree, and at least a third; a fifth does not occur by chance.
     """
     consistent, near = counts
     return near >= 12 and consistent + math.sqrt(max(consistent, 1.0)) < 0.2 * near
@@ -91,9 +91,9 @@ def is_contradicted(counts: tuple[int, int]) -> bool:
 
 @njit(cache=True, nogil=True)
 def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cosine: float, radius: float) -> int:
-    """Tell of a candidate whether it lies in a cylinder and is of like radius (1), and whether it agrees, too (2).
+    """Return 1 if a candidate lies in a cylinder and has a similar radius, 2 if it also agrees, otherwise 0.
 
-    Offset in the cylinder's radii, cosine of the angle, relative radius.
+    The limits are the offset in the cylinder's radii, the cosine of the angle, and the relative radius.
     """
     dx, dy, dz = row[0] - model[0], row[1] - model[1], row[2] - model[2]
     height = dx * model[UX] + dy * model[UY] + dz * model[UZ]
@@ -105,7 +105,7 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
         return 1 if LIKE_RADIUS < ratio < 1.0 / LIKE_RADIUS else 0
     if abs(ratio - 1.0) < radius:
         return 2
-    return 1 if CONCENTRIC < ratio < 1.0 / CONCENTRIC else 0  # a pipe within a pipe speaks for itself
+    return 1 if CONCENTRIC < ratio < 1.0 / CONCENTRIC else 0  # a pipe within a pipe is a separate object
 
 
 @njit(cache=True, nogil=True)

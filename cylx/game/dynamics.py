@@ -1,8 +1,8 @@
-"""Evolutionary games on a payoff matrix: from payoffs to a stable population. Knows no cylinders.
+"""Evolutionary games on a payoff matrix: from payoffs to a stable population. Independent of cylinders.
 
-A population x on the simplex evolves towards more mean payoff x' A x. With a zero diagonal the supports of its stable
-states are dominant sets, the clusters of the pairwise similarity A (Pavan and Pelillo); with a unit diagonal every
-stable state is a single strategy, so the answer depends on when one stops.
+A population x on the simplex evolves towards a larger mean payoff x' A x. With a zero diagonal the supports of its
+stable states are dominant sets, the clusters of the pairwise similarity A (Pavan and Pelillo). With a unit diagonal
+every stable state is a single strategy, so the answer depends on when the iteration stops.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from numba import njit
 from cylx.geometry.arrays import FloatArray, IndexArray
 
 EXTINCT = 1e-9
-"""A share of the final population below this is taken for zero: replicators get there only in infinite time."""
+"""A share of the final population below this counts as zero: replicators reach zero only in infinite time."""
 GONE = 1e-200
-"""A share below this cannot come back before the dynamics end."""
+"""A share below this cannot recover before the dynamics end."""
 
 
 @njit(cache=True, nogil=True)
@@ -101,10 +101,10 @@ def evolve(
     dynamics : {"replicator", "infection-immunization"}
         Discrete replicator dynamics (eq. 7), or Rota Bulo and Bomze's faster way to the same equilibria.
     max_iterations : int
-        Most steps.
+        Maximum number of steps.
     tolerance : float
-        Stop when a step changes the population by less than this (replicator, sum of absolute changes), or when no
-        strategy could gain more than this (infection-immunization).
+        Stop when a step changes the population by less than this (replicator, sum of absolute changes), or no strategy
+        could gain more than this (infection-immunization).
     start : ndarray of shape (M,), optional
         First population; uniform by default.
 
@@ -115,7 +115,7 @@ def evolve(
 
     Examples
     --------
-    Three strategies that agree, and one that agrees with nobody:
+    Three strategies that agree, and one that agrees with none:
 
     >>> payoff = np.ones((4, 4)) - np.eye(4)
     >>> payoff[3, :] = payoff[:, 3] = 0.0
@@ -157,7 +157,7 @@ def _fill_block(
 
 
 class SparsePayoff:
-    """A symmetric payoff matrix of which only the positive entries are kept, row by row.
+    """A symmetric payoff matrix that stores only the positive entries, row by row.
 
     Parameters
     ----------
@@ -183,17 +183,17 @@ class SparsePayoff:
         return cls(pointers, columns.astype(np.int64), payoff[rows, columns])
 
     def row(self, i: int) -> tuple[IndexArray, FloatArray]:
-        """Give the columns and payoffs of row i."""
+        """Return the columns and payoffs of row i."""
         part = slice(self.pointers[i], self.pointers[i + 1])
         return self.indices[part], self.values[part]
 
     def degrees(self) -> FloatArray:
-        """Give the sum of each row, shape (M,)."""
+        """Return the sum of each row, shape (M,)."""
         rows = np.repeat(np.arange(len(self._place)), np.diff(self.pointers))
         return np.asarray(np.bincount(rows, self.values, minlength=len(self._place)), dtype=np.float64)
 
     def block(self, nodes: IndexArray) -> FloatArray:
-        """Give the payoffs among a few strategies, shape (m, m)."""
+        """Return the payoffs among a few strategies, shape (m, m)."""
         out = np.zeros((len(nodes), len(nodes)))
         _fill_block(self.pointers, self.indices, self.values, nodes, self._place, out)
         return out

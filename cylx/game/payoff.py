@@ -1,4 +1,4 @@
-"""The payoff of pairs of cylinders: how well two hypotheses play together (section 3.1, eq. 1, 2, 5 and 6)."""
+"""The payoff of pairs of cylinders: how well two candidates agree (section 3.1, eq. 1, 2, 5 and 6)."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
 
 PIECE = 4096
-"""Candidates that one thread takes at a time."""
+"""Candidates per task of a thread."""
 
 CUT = 0.1
 """Local payoffs below this are zero."""
 REACH_IN_RADII = 4.0
-"""Candidates play against those within this many radii, or their own extent if that is more."""
+"""Candidates play against those within this many radii, or their own extent if that is larger."""
 
 
 def screw_payoff(models: FloatArray, parents: IndexArray, scale: float, min_ratio: float) -> FloatArray:
-    """Give the paper's payoff (eq. 2, 5 and 6) of all pairs, shape (M, M), with a zero diagonal.
+    """Return the paper's payoff (eq. 2, 5 and 6) of all pairs, shape (M, M), with a zero diagonal.
 
-    Lengths are measured in the median radius of the candidates and from the middle of their points: eq. 1 mixes radians
-    with lengths and depends on the origin, and so the paper's own experiments, a cylinder of radius 1 at the origin,
-    are met exactly.
+    Lengths are in units of the median radius of the candidates, relative to the middle of their points, because eq. 1
+    mixes radians with lengths and depends on the origin. The paper's own experiments, with a cylinder of radius 1 at
+    the origin, are reproduced exactly.
 
     Parameters
     ----------
@@ -63,30 +63,30 @@ def local_payoff(
     min_ratio: float,
     threads: int = 1,
 ) -> SparsePayoff:
-    """Give the payoffs of all pairs within reach: angle, offset at the candidates in radii, ratio of radii.
+    """Return the payoffs of all pairs within reach: angle, offset at the candidates in radii, ratio of radii.
 
     Parameters
     ----------
     models : ndarray of shape (M, 7)
-        The places the candidates speak for, unit directions, radii.
+        Locations of the candidates, unit directions, radii.
     parents : ndarray of shape (M,)
         Candidates of one parent are incompatible.
     extents : ndarray of shape (M,)
-        A candidate reaches as far as its extent, at least four radii.
+        A candidate reaches as far as its extent, and at least four radii.
     angle, offset, radius : float
-        Where the payoff has fallen to 1/e: radians, radii, relative difference.
+        Scales at which the payoff has fallen to 1/e: radians, radii, relative difference.
     min_ratio : float
-        Candidates whose radii differ more are incompatible.
+        Candidates whose radii differ by more are incompatible.
     threads : int
         Does not change the result.
 
     Returns
     -------
     SparsePayoff
-        exp(-sqrt((angle / a)^2 + (offset / o)^2 + ((1 - ratio) / p)^2)) where it exceeds 0.1, else nothing.
+        exp(-sqrt((angle / a)^2 + (offset / o)^2 + ((1 - ratio) / p)^2)) if it exceeds 0.1, otherwise no entry.
     """
     least_ratio = max(min_ratio, 1.0 + math.log(CUT) * radius)
-    # by bins of the radius, of which only neighbours can be compatible, and of the reach; along x within a bin
+    # sorted by bins of the radius (only neighbouring bins can be compatible), then of the reach, then along x
     reaches = np.maximum(REACH_IN_RADII * models[:, RADIUS], extents)
     radius_bins = np.floor(np.log(models[:, RADIUS]) / -math.log(least_ratio)).astype(np.int64)
     keys = (radius_bins << 12) + np.floor(np.log2(reaches)).astype(np.int64) + 2048
@@ -119,7 +119,7 @@ def local_payoff(
 
 @njit(cache=True, nogil=True)
 def _first_from(models: FloatArray, low: int, high: int, x: float) -> int:
-    """Give the first of the models low..high, sorted by x, that is not below `x`."""
+    """Return the index of the first of the models low..high, sorted by x, that is not below `x`."""
     while low < high:
         middle = (low + high) >> 1
         if models[middle, 0] < x:
@@ -144,13 +144,13 @@ def _pairs(
     least_ratio: float,
     widths: tuple[float, float, float],
 ) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """Give the pairs of the candidates first..last of one bin with those after them in it and in later bins."""
+    """Return the pairs of the candidates first..last of one bin with the candidates after them, also in later bins."""
     n, room = 0, 1024
     rows, columns, values = np.empty(room, np.int64), np.empty(room, np.int64), np.empty(room)
     for b in range(own, len(bins)):
         if bins[b] > bins[own] + 1:
             break
-        # the mean radius of a pair may exceed the smaller one by this much
+        # the mean radius of a pair may exceed the smaller one by this factor
         span = max(widest[own], widest[b]) / least_ratio
         for i in range(first, last):
             begin = i + 1 if b == own else _first_from(models, starts[b], starts[b + 1], models[i, 0] - span)
@@ -174,7 +174,7 @@ def _pairs(
 
 @njit(cache=True, nogil=True)
 def _grown(values: NDArray[Any]) -> NDArray[Any]:
-    """Give an array twice as long that begins with the same values."""
+    """Return an array twice as long that begins with the same values."""
     out = np.empty(2 * len(values), values.dtype)
     for i in range(len(values)):
         out[i] = values[i]
@@ -210,7 +210,7 @@ def _enter(
 def _play(
     one: FloatArray, other: FloatArray, reach: float, least_ratio: float, widths: tuple[float, float, float]
 ) -> float:
-    """Give the payoff of two candidates, 0 if they are out of reach or incompatible."""
+    """Return the payoff of two candidates, 0 if they are out of reach or incompatible."""
     bound = -math.log(CUT)
     dx, dy, dz = other[0] - one[0], other[1] - one[1], other[2] - one[2]
     square = dx * dx + dy * dy + dz * dz

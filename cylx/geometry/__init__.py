@@ -1,1 +1,1 @@
-"""Shapes and their laws: arrays in, shapes out."""
+"""Geometric shapes and the computations on them."""

@@ -1,4 +1,4 @@
-"""How far a cloud reaches, in one pass over its points: NumPy takes several times as long along rows of three."""
+"""The size of a cloud, in one pass over its points; NumPy takes several times as long along rows of three."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from cylx.geometry.arrays import FloatArray
 
 
 def box_of(points: FloatArray) -> FloatArray:
-    """Give the least and the greatest coordinates, shape (2, 3)."""
+    """Return the least and the greatest coordinates, shape (2, 3)."""
     box = np.empty((2, 3))
     _fill_box(points, box)
     return box
 
 
 def extent_of(points: FloatArray) -> float:
-    """Give the diagonal of the bounding box."""
+    """Return the diagonal of the bounding box."""
     return float(np.linalg.norm(np.ptp(box_of(points), axis=0)))
 
 
@@ -33,7 +33,7 @@ def _fill_box(points: FloatArray, box: FloatArray) -> None:
 
 @njit(cache=True, nogil=True)
 def widest_deviation(points: FloatArray, low: FloatArray) -> float:
-    """Give the mean absolute deviation from the mean, of the coordinate where it is greatest."""
+    """Return the mean absolute deviation from the mean, for the coordinate with the largest one."""
     widest = 0.0
     for d in range(3):
         mean, total = 0.0, 0.0

@@ -1,4 +1,4 @@
-"""Points in cells with bounding balls: everything near a line, without looking at every point."""
+"""Points in cells with bounding balls: find the points near a line without testing every point."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.geometry.morton import BITS, cell_starts
 
 RUNS_IN_BLOCK = 32
-"""Runs in a block; most blocks lie apart from a line as a whole."""
+"""Runs in a block; most blocks can be skipped as a whole."""
 
 
 class Cells:
@@ -25,7 +25,7 @@ class Cells:
     codes : ndarray of shape (N,)
         Sorted Morton codes.
     occupancy : int
-        Points a run should hold, roughly.
+        Approximate number of points in a run.
     """
 
     def __init__(self, points: FloatArray, codes: IndexArray, occupancy: int = 32) -> None:
@@ -38,12 +38,12 @@ class Cells:
         self._blocks = _balls_of(points, np.append(self._starts[:-1:RUNS_IN_BLOCK], self._starts[-1]))
 
     def near_cylinder(self, model: FloatArray, low: float, high: float, inner: float, outer: float) -> IndexArray:
-        """Give the points between two heights and two distances from an axis.
+        """Return the points between two heights and two distances from an axis.
 
         Parameters
         ----------
         model : ndarray of shape (7,)
-            A point of the axis, where heights are zero, its unit direction, and a radius that is not looked at.
+            A point of the axis, where heights are zero, its unit direction, and a radius that is ignored.
         low, high : float
             Least and greatest height.
         inner, outer : float
@@ -69,7 +69,7 @@ class Cells:
         marks: FloatArray,
         limit: float,
     ) -> FloatArray:
-        """Give the points near a cylinder's surface, about `most` of them, whose mark is below a limit.
+        """Return the points near a cylinder's surface, about `most` of them, whose mark is below a limit.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class Cells:
         half, width : float
             Half the height, and the greatest distance from the surface.
         most : int or None
-            Every so manyth point is taken.
+            Approximate number of points to return, evenly picked; None for all.
         marks : ndarray of shape (N,)
         limit : float
 
@@ -108,7 +108,7 @@ def _copy_marked(
 
 
 def _balls_of(points: FloatArray, starts: IndexArray) -> FloatArray:
-    """Give centre and radius of a ball about each run of points, shape (C, 4)."""
+    """Return centre and radius of a ball about each run of points, shape (C, 4)."""
     balls = np.empty((len(starts) - 1, 4))
     _fill_balls(points, starts, balls)
     return balls
@@ -133,7 +133,7 @@ def _fill_balls(points: FloatArray, starts: IndexArray, balls: FloatArray) -> No
 def _apart(
     x: float, y: float, z: float, reach: float, model: FloatArray, low: float, high: float, inner: float, outer: float
 ) -> bool:
-    """Tell whether a ball of radius `reach` lies outside the hollow cylinder altogether."""
+    """Return whether a ball of radius `reach` lies completely outside the hollow cylinder."""
     dx, dy, dz = x - model[0], y - model[1], z - model[2]
     height = dx * model[UX] + dy * model[UY] + dz * model[UZ]
     if height < low - reach or height > high + reach:
@@ -156,7 +156,7 @@ def _find_runs(
     outer: float,
     runs: IndexArray,
 ) -> tuple[int, int]:
-    """Fill in the runs that may have points in the hollow cylinder; count them, and their points."""
+    """Fill in the runs that may have points in the hollow cylinder; return their number, and the number of points."""
     count, most = 0, 0
     for b in range(len(blocks)):
         if _apart(blocks[b, 0], blocks[b, 1], blocks[b, 2], blocks[b, 3], model, low, high, inner, outer):

@@ -1,4 +1,4 @@
-"""The circle through points of a plane, found robustly."""
+"""The circle through points of a plane, with robust search."""
 
 from __future__ import annotations
 
@@ -35,12 +35,12 @@ def search_circle(
     least, greatest : float
         Radii.
     shape : ndarray of shape (5,)
-        Centre, radius twice, and 0: as the shape of an ellipse.
+        Centre, the radius twice, and 0, as in the shape of an ellipse.
 
     Returns
     -------
     float
-        The support: a sum over the points near it of one minus the squared distance over the squared tolerance.
+        The support: the sum over the points near it of one minus the squared distance over the squared tolerance.
     """
     record = 0.0
     for k in range(len(samples)):
@@ -125,7 +125,7 @@ def _improve(points: FloatArray, shape: FloatArray, steps: int) -> bool:
 
 
 def _taubin(points: FloatArray) -> tuple[FloatArray, float]:
-    """Give Taubin's circle of centred points by Newton's method on its characteristic polynomial (Chernov, 2010)."""
+    """Return Taubin's circle of centred points by Newton's method on its characteristic polynomial (Chernov, 2010)."""
     x, y = points[:, 0], points[:, 1]
     z = x * x + y * y
     xx, yy, xy = float((x * x).mean()), float((y * y).mean()), float((x * y).mean())

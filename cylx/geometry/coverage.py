@@ -1,4 +1,4 @@
-"""How much of the angle about an axis points cover."""
+"""The angle about an axis that points cover."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ SECTORS = 36
 
 
 def covered_angle(angles: FloatArray) -> float:
-    """Give the angle that points cover about an axis, radians.
+    """Return the angle that points cover about an axis, radians.
 
-    A sector counts if it holds at least 15 % of what a typical filled one does. Sectors are finer where
-    there are points enough for it.
+    A sector counts if it holds at least 15 % of the points in a typical filled sector. With more points, the sectors
+    are finer.
     """
     if len(angles) == 0:
         return 0.0
@@ -24,12 +24,12 @@ def covered_angle(angles: FloatArray) -> float:
 
 
 def filled_sectors(angles: FloatArray, sectors: int, share: float = 0.15) -> MaskArray:
-    """Tell which sectors hold more than a share of what a typical filled one does."""
+    """Return which sectors hold more than a share of the points in a typical filled sector."""
     index = ((angles / (2.0 * np.pi) + 0.5) * sectors).astype(np.int64) % sectors
     counts = np.bincount(index, minlength=sectors)
     return np.asarray(counts > max(0.5, share * float(np.median(counts[counts > 0]))), dtype=np.bool_)
 
 
 def sector_of(angles: FloatArray) -> IndexArray:
-    """Give the sector, of `SECTORS`, that each angle (radians) lies in."""
+    """Return the index of the sector, of `SECTORS`, for each angle (radians)."""
     return np.floor((angles / (2.0 * np.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS

@@ -28,7 +28,7 @@ class Cylinder:
     point : ndarray of shape (3,)
         Middle of the axis segment, scene units.
     direction : ndarray of shape (3,)
-        Direction of the axis; normalised, and its largest component made positive.
+        Direction of the axis; normalised, with its largest component made positive.
     radius : float
         Scene units, > 0.
     height : float
@@ -73,7 +73,7 @@ class Cylinder:
         return self.point + 0.5 * self.height * self.direction
 
     def moved(self, origin: ArrayLike, scale: float = 1.0) -> Cylinder:
-        """Give the cylinder where x -> scale x + origin takes its points."""
+        """Return the cylinder transformed by x -> scale x + origin."""
         return Cylinder(
             scale * self.point + np.asarray(origin), self.direction, scale * self.radius, scale * self.height
         )
@@ -103,7 +103,7 @@ def canonical_direction(direction: ArrayLike) -> FloatArray:
 def cylinder_coordinates(
     points: FloatArray, point: ArrayLike, direction: ArrayLike
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give each point's height along the axis, distance from the axis and angle about it.
+    """Return each point's height along the axis, distance from the axis and angle about it.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def cylinder_coordinates(
 
 
 def axis_basis(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Give two unit vectors that make a right-handed basis with a unit direction.
+    """Return two unit vectors that make a right-handed basis with a unit direction.
 
     Returns
     -------
@@ -151,7 +151,7 @@ def axis_frame(direction: ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def surface_distances(points: FloatArray, cylinder: Cylinder) -> FloatArray:
-    """Give the signed distance of each point to the infinite cylinder's surface, + is outside.
+    """Return the signed distance of each point to the infinite cylinder's surface, + is outside.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def surface_distances(points: FloatArray, cylinder: Cylinder) -> FloatArray:
 
 
 def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[FloatArray, FloatArray]:
-    """Give heights and angles of the points within `width` of a cylinder's surface.
+    """Return heights and angles of the points within `width` of a cylinder's surface.
 
     Parameters
     ----------
@@ -188,7 +188,7 @@ def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[Floa
 def coordinates_of(
     points: FloatArray, indices: IndexArray, model: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give heights, signed distances to a cylinder's surface, and angles of some of the points, shape (n,) each."""
+    """Return heights, signed distances to a cylinder's surface, and angles of some of the points, shape (n,) each."""
     heights, residuals, angles = np.empty(len(indices)), np.empty(len(indices)), np.empty(len(indices))
     fill_coordinates(points[indices], model, math.inf, heights, residuals, angles)
     return heights, residuals, angles
@@ -198,7 +198,7 @@ def coordinates_of(
 def fill_coordinates(
     points: FloatArray, model: FloatArray, width: float, heights: FloatArray, residuals: FloatArray, angles: FloatArray
 ) -> int:
-    """Fill in height, signed distance to the surface, and angle of the points within `width` of it; count them."""
+    """Fill in height, signed distance and angle of the points within `width` of the surface; return their number."""
     basis = np.empty((2, 3))
     fill_basis(model[UX : UZ + 1], basis)
     n = 0

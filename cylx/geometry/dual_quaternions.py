@@ -1,7 +1,7 @@
 """Unit dual quaternions: rigid motions as screws, their logarithm, their average (appendix A).
 
-A dual quaternion is an array of shape (..., 8): the real quaternion (w, x, y, z), then the dual one. A motion is the
-real part q0 with the dual part t q0 / 2, t being the pure quaternion of the translation.
+A dual quaternion is an array of shape (..., 8): the real quaternion (w, x, y, z), then the dual one. A motion has the
+real part q0 and the dual part t q0 / 2, where t is the pure quaternion of the translation.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ def _product(p: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def multiply(p: FloatArray, q: FloatArray) -> FloatArray:
-    """Multiply dual quaternions of shape (..., 8): first the motion q, then p."""
+    """Multiply dual quaternions of shape (..., 8): the motion q first, then p."""
     real = _product(p[..., :4], q[..., :4])
     return np.concatenate([real, _product(p[..., :4], q[..., 4:]) + _product(p[..., 4:], q[..., :4])], axis=-1)
 
 
 def conjugate(q: FloatArray) -> FloatArray:
-    """Give the quaternion conjugate of both parts: the inverse of a unit dual quaternion."""
+    """Return the quaternion conjugate of both parts: the inverse of a unit dual quaternion."""
     return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0]))
 
 
@@ -39,10 +39,10 @@ def normalised(q: FloatArray) -> FloatArray:
 
 
 def screw(axis: FloatArray, foot: FloatArray, angle: FloatArray, shift: FloatArray) -> FloatArray:
-    """Give the motion that turns by `angle` about the line (foot, axis) and moves by `shift` along it (A.2).
+    """Return the motion that rotates by `angle` about the line (foot, axis) and moves by `shift` along it (A.2).
 
-    The text of (A.2) has the dual angle 2 beta + 2 eps |T|, whose half in the cosine would apply the motion twice; the
-    dual angle meant is beta + eps |T|.
+    (A.2) as printed has the dual angle 2 beta + 2 eps |T|, whose half in the cosine would apply the motion twice; beta
+    + eps |T| is meant.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def screw(axis: FloatArray, foot: FloatArray, angle: FloatArray, shift: FloatArr
 
 
 def logarithm(q: FloatArray) -> FloatArray:
-    """Give the logarithm of unit dual quaternions: half the dual angle times the dual axis (A.3).
+    """Return the logarithm of unit dual quaternions: half the dual angle times the dual axis (A.3).
 
     Parameters
     ----------
@@ -83,8 +83,8 @@ def logarithm(q: FloatArray) -> FloatArray:
     small = sine < 1e-12
     safe = np.where(small, 1.0, sine)
     factor = np.where(small, 1.0, half / safe)
-    # d = slide along the axis; from the scalar dual part -d sin(half), and from the part of the dual vector along the
-    # axis
+    # d = slide along the axis; from the scalar dual part -d sin(half), and from the component of the dual
+    # vector along the axis
     axis = q[..., 1:4] / safe
     slide = np.where(small, 0.0, -q[..., 4:5] / safe)
     moment = (q[..., 5:8] - slide * q[..., :1] * axis) / safe
@@ -93,7 +93,7 @@ def logarithm(q: FloatArray) -> FloatArray:
 
 
 def exponential(twist: FloatArray) -> FloatArray:
-    """Give the unit dual quaternion whose logarithm is `twist`, shape (..., 6)."""
+    """Return the unit dual quaternion whose logarithm is `twist`, shape (..., 6)."""
     half = np.linalg.norm(twist[..., :3], axis=-1, keepdims=True)
     small = half < 1e-12
     axis = twist[..., :3] / np.where(small, 1.0, half)
@@ -108,14 +108,14 @@ def exponential(twist: FloatArray) -> FloatArray:
 def line_screws(
     point: FloatArray, direction: FloatArray, points: FloatArray, directions: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Give the smallest screw from one line to each of several (section 3.1, A.2).
+    """Return the smallest screw from one line to each of several (section 3.1, A.2).
 
     Parameters
     ----------
     point, direction : ndarray of shape (3,) or (..., 3)
         The line to move.
     points, directions : ndarray of shape (..., 3)
-        Where to.
+        The target lines.
 
     Returns
     -------
@@ -128,16 +128,16 @@ def line_screws(
     feet, others, angle, axis = common_perpendicular(point, direction, points, directions)
     gap = others - feet
     length = np.linalg.norm(gap, axis=-1)
-    # parallel lines have an arbitrary axis: the motion is the translation itself
+    # the axis of parallel lines is arbitrary: the motion is the translation itself
     aside = (angle == 0.0) & (length > 0.0)
     axis = np.where(aside[..., None], gap / np.where(aside, length, 1.0)[..., None], axis)
-    # of lines that are nearly parallel the feet are uncertain, but not the distance along the common perpendicular
+    # for nearly parallel lines the feet are uncertain, but not the distance along the common perpendicular
     shift = np.where(aside, length, ((points - point) * axis).sum(-1))
     return screw(axis, feet, angle, shift), angle, np.abs(shift)
 
 
 def pairwise_screw_distances(points: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give the distance of eq. 1 and the gap |T| of all pairs of lines.
+    """Return the distance of eq. 1 and the gap |T| of all pairs of lines.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def pairwise_screw_distances(points: FloatArray, directions: FloatArray) -> tupl
     for i in range(count):
         motions, _, gaps[i] = line_screws(points[i], directions[i], points, directions)
         distances[i] = np.linalg.norm(logarithm(motions), axis=-1)
-    # the two ways round differ by rounding only
+    # the two directions of a pair differ by rounding only
     return 0.5 * (distances + distances.T), 0.5 * (gaps + gaps.T)
 
 
@@ -170,7 +170,7 @@ def blend(motions: FloatArray, weights: FloatArray, max_iterations: int = 20, to
         Non-negative, of sum 1.
     max_iterations : int
     tolerance : float
-        Ends when the step is shorter.
+        The iteration ends when a step is shorter.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The ellipse: its direct least-squares fit, its robust fit, its distances."""
+"""The ellipse: direct least-squares fit, robust fit, and distances."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cylx.geometry.numerics import REORDERED, solve_in_place
 
 @dataclass(frozen=True, slots=True)
 class Degenerate:
-    """Why some points admit no answer: a value, because it happens a thousand times a run."""
+    """The reason why points admit no solution; a return value, as it occurs thousands of times per run."""
 
     reason: str
 
@@ -51,7 +51,7 @@ class Ellipse:
         return np.array([math.cos(self.angle), math.sin(self.angle)])
 
     def conic(self) -> FloatArray:
-        """Give (a, b, c, d, e, f) of a x^2 + b x y + c y^2 + d x + e y + f = 0, negative inside, with a + c = 1."""
+        """Return (a, b, c, d, e, f) of a x^2 + b x y + c y^2 + d x + e y + f = 0, negative inside, with a + c = 1."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         u, v = self.semi_major**-2, self.semi_minor**-2
         a, b = u * cosine**2 + v * sine**2, 2.0 * cosine * sine * (u - v)
@@ -65,7 +65,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
     """Fit an ellipse to points by direct least squares.
 
     Minimises the algebraic distance under 4 a c - b^2 = 1, in the numerically stable form, after centring and scaling.
-    Points of a hyperbola get an ellipse, too, which is far from them.
+    Points on a hyperbola also give an ellipse, far away from them.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
     middle = points.mean(axis=0)
     offsets = points - middle
     scale = float(np.sqrt((offsets**2).sum(axis=1).mean()))
-    if not (np.ptp(points, axis=0).any() and scale > 0):  # the mean of equal points is off by rounding
+    if not (np.ptp(points, axis=0).any() and scale > 0):  # the mean of equal points has rounding errors
         return Degenerate("all points are equal")
     x, y = (offsets / scale).T
     quadratic = np.column_stack([x * x, x * y, y * y])
@@ -111,7 +111,7 @@ def fit_ellipse(points: FloatArray) -> Ellipse | Degenerate:
 
 
 def _from_conic(conic: FloatArray) -> tuple[FloatArray, float, float, float] | None:
-    """Give centre, semi-axes and angle of a conic, None if it is no real ellipse."""
+    """Return centre, semi-axes and angle of a conic; None if it is not a real ellipse."""
     shape = np.empty(5)
     if not conic_shape(np.asarray(conic, dtype=np.float64), shape):
         return None
@@ -140,7 +140,7 @@ def conic_shape(conic: FloatArray, shape: FloatArray) -> bool:
 
 
 def ellipse_distances(ellipse: Ellipse, points: FloatArray) -> FloatArray:
-    """Give signed first-order (Sampson) distances of points to an ellipse, + is outside.
+    """Return signed first-order (Sampson) distances of points to an ellipse, + is outside.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def search_ellipse(
     ----------
     points : ndarray of shape (n, 2)
     samples : ndarray of shape (k, 5)
-        Indices of points; samples with repeated points are passed over.
+        Indices of points; samples with repeated points are skipped.
     tolerance : float
         Distance within which a point supports an ellipse.
     semi_minor : tuple of float
@@ -180,7 +180,7 @@ def search_ellipse(
     max_aspect : float
         Greatest semi_major / semi_minor.
     refits : int
-        Direct fits to the support, at most.
+        Maximum number of direct fits to the support.
 
     Returns
     -------
@@ -224,7 +224,7 @@ def search_conic(
     max_aspect: float,
     best: FloatArray,
 ) -> float:
-    """Fill `best` (6,) with the conic through five of xy[:, :n] that has the most support; give that support."""
+    """Fill `best` (6,) with the conic through five of xy[:, :n] that has the most support; return that support."""
     matrix, right = np.empty((5, 5)), np.empty(5)
     record = 0.0
     for k in range(len(samples)):
@@ -258,7 +258,7 @@ def search_conic(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
 def _support(xy: FloatArray, n: int, conic: FloatArray, tolerance: float) -> float:
-    """Add up one minus the squared distance from a conic over the squared tolerance, to first order."""
+    """Return the sum of one minus the squared distance from a conic over the squared tolerance, to first order."""
     a, b, c, d, e = conic[0], conic[1], conic[2], conic[3], conic[4]
     score = 0.0
     for i in range(n):

@@ -1,4 +1,4 @@
-"""How far the surface of a cylinder goes on along its axis."""
+"""The extent of the surface of a cylinder along its axis."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from cylx.geometry.numerics import median_of_positive, sort_in_place
 
 ARC_BINS = 24
 LEAST_POINTS_OF_EXTENT = 15
-"""Points without which an extent cannot be told."""
+"""Minimum number of points for an extent."""
 FAINT = 0.2
-"""A piece with less than this share of what one of the known part holds on average shows something that passes by."""
+"""A piece with less than this share of the mean of the known part's pieces shows another, passing object."""
 FULL_PIECE = 12.0
-"""Points a piece of the height should hold."""
+"""Number of points that a piece of the height should hold."""
 LONE = 6.0
-"""An outermost point is a stray if the third of the points from the end lies more than this many usual gaps further in;
-of even points one in sixty looks so."""
+"""An outermost point is a stray if the third point from the end lies further in by more than this many usual gaps; with
+evenly spread points one in sixty does."""
 
 
 def visible_extent(
     heights: FloatArray, angles: FloatArray, half: float, radius: float, filled: float = 0.35, doubt: float = 1.0
 ) -> tuple[float, float] | None:
-    """Find how far a surface goes on, by pieces of its height in which its arc is filled.
+    """Find the extent of a surface along the axis, by pieces of its height in which the arc is filled.
 
-    Density alone would follow a can along the table it touches; what counts is the share of the arc's angles that are
-    filled.
+    The density alone would follow a can along the table it touches. The criterion is therefore the share of the arc's
+    angles that are filled.
 
     Parameters
     ----------
     heights, angles : ndarray of shape (n,)
         Cylinder coordinates of the points on the surface.
     half : float
-        The arc is taken from the points with heights within this.
+        The arc is found from the points with heights within this.
     radius : float
     filled : float
-        A piece belongs if it fills this share of what the median piece fills.
+        A piece is accepted if it fills this share of the median piece.
     doubt : float
-        Share of what is asked of a piece that is asked of those within `half`: less than 1 if they have been found to
-        belong before, so that a cylinder that grows is not cut where it is thinly seen.
+        Reduced requirement for pieces within `half`, as a share: less than 1 if they have been accepted before, so that
+        a growing cylinder is not cut where it is sparsely seen.
 
     Returns
     -------
     low, high : float
-        Heights of the ends, None if fewer than 15 points are there.
+        Heights of the ends; None with fewer than 15 points.
     """
     ends = np.empty(2)
     found = _find_ends(np.ascontiguousarray(heights), np.ascontiguousarray(angles), half, radius, filled, doubt, ends)
@@ -117,7 +117,7 @@ def _fill_shares(
     pieces: int,
     least: FloatArray,
 ) -> FloatArray:
-    """Give the share of the arc's bins that hold a point, for each piece of the height; 0 for those too faint."""
+    """Return for each piece of the height the share of the arc's bins that hold a point; 0 for pieces too sparse."""
     occupied = np.zeros((pieces, ARC_BINS), np.bool_)
     shares, counts = np.zeros(pieces), np.zeros(pieces)
     for i in range(len(heights)):
@@ -138,7 +138,7 @@ def _fill_shares(
 def _choose_run(
     shares: FloatArray, pieces: int, piece: float, first: float, half: float, filled: FloatArray, bridge: float
 ) -> tuple[int, int]:
-    """Give first and last piece of the run of filled ones that overlaps the known height most; gaps are bridged."""
+    """Return first and last piece of the run of filled ones that overlaps the known height most; gaps are bridged."""
     inside, scratch, n = np.empty(pieces), np.empty(pieces), np.int64(0)
     for p in range(pieces):
         if abs((first + p + 0.5) * piece) <= half + 0.5 * piece:

@@ -1,4 +1,4 @@
-"""Lines in space: their common perpendicular, and whether they are parallel to an axis."""
+"""Lines in space: common perpendicular, parallelism, and fit."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.numerics import cross, symmetric_eigen
 
 LEAST_POINTS_OF_LINE = 8
-"""Points that a line is fitted to."""
+"""Maximum number of points used to fit a line."""
 
 PARALLEL = 1e-8
-"""Below this angle, in radians, rounding of the directions costs more than taking the lines for parallel."""
+"""Below this angle, in radians, rounding errors of the directions exceed the error of taking the lines as parallel."""
 
 
 def common_perpendicular(
     first_points: FloatArray, first_directions: FloatArray, second_points: FloatArray, second_directions: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Give the feet, the angle and the axis of the shortest motion from one line to another, for pairs of lines.
+    """Return the feet, the angle and the axis of the shortest motion from one line to another, for pairs of lines.
 
-    Directions are taken up to sign, so the angle is at most a right angle.
+    The sign of a direction does not matter, so the angle is at most a right angle.
 
     Parameters
     ----------
@@ -38,8 +38,8 @@ def common_perpendicular(
         m1 and m2 of section 3.1: the points of the lines that are closest to each other. For parallel lines the foot is
         the first line's point.
     angle : ndarray of shape (...)
-        beta, in [0, pi / 2]; by the arc tangent, which is exact everywhere: the paper's arc sine is not near a right
-        angle.
+        beta, in [0, pi / 2]; by the arc tangent, which is accurate everywhere. The paper's arc sine is inaccurate near
+        a right angle.
     axis : ndarray of shape (..., 3)
         s, unit, orthogonal to both lines; the rotation by `angle` about it turns the first direction into the second.
     """
@@ -47,14 +47,14 @@ def common_perpendicular(
     turned = sign * second_directions
     cosine = (first_directions * turned).sum(-1, keepdims=True)
     normal = cross(first_directions, turned)
-    # rounding along the lines is much of the cross product of nearly parallel ones
+    # for nearly parallel lines, rounding errors along the lines are a large part of the cross product
     normal -= (normal * first_directions).sum(-1, keepdims=True) * first_directions
     sine = np.linalg.norm(normal, axis=-1, keepdims=True)
     angle = np.arctan2(sine, cosine)
     parallel = angle < PARALLEL
     across = second_points - first_points
     square = np.where(parallel, 1.0, sine * sine)
-    # as determinants: in differences of dot products nearly parallel lines lose all their digits
+    # as determinants: differences of dot products lose all their digits for nearly parallel lines
     t1 = (cross(across, turned) * normal).sum(-1, keepdims=True) / square
     t2 = (cross(across, first_directions) * normal).sum(-1, keepdims=True) / square
     t1 = np.where(parallel, 0.0, t1)
@@ -73,15 +73,15 @@ def common_perpendicular(
 
 
 def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> MaskArray:
-    """Tell which directions are parallel to an axis within an angle; signs do not matter.
+    """Return which directions are parallel to an axis within an angle; signs do not matter.
 
     Parameters
     ----------
     directions : ndarray of shape (..., 3)
     axis : array_like of shape (3,)
-        Of any length but zero.
+        Of any length except zero.
     tolerance : float
-        Greatest angle, radians; a right angle admits all.
+        Greatest angle, radians; a right angle accepts all.
 
     Returns
     -------
@@ -93,19 +93,19 @@ def are_along(directions: FloatArray, axis: ArrayLike, tolerance: float) -> Mask
     array([ True, False])
     """
     line = np.array(axis, dtype=np.float64)
-    line /= np.abs(line).max()  # so that its square neither overflows nor vanishes
+    line /= np.abs(line).max()  # so that its square neither overflows nor underflows
     sine = np.linalg.norm(cross(directions, line), axis=-1)
     return np.asarray(np.arctan2(sine, np.abs(directions @ line)) <= tolerance, dtype=np.bool_)
 
 
 @njit(cache=True, nogil=True)
 def fit_line(xyz: FloatArray, n: int, reach: float, place: FloatArray, direction: FloatArray) -> tuple[float, float]:
-    """Fit a line to those of xyz[:, :n] within `reach` of zero, trimmed twice; fill `place` and `direction` (3,).
+    """Fit a line to the points xyz[:, :n] within `reach` of zero, trimmed twice; fill `place` and `direction` (3,).
 
     Returns
     -------
     across, along : float
-        Root mean square distances from the line, and from its middle along it; infinite and 1 if it has too few points.
+        Root mean square distances from the line, and from its middle along it; infinite and 1 with too few points.
     """
     matrix, vectors, total = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     chosen = np.empty(n, np.bool_)
@@ -146,7 +146,7 @@ def fit_line(xyz: FloatArray, n: int, reach: float, place: FloatArray, direction
 
 @njit(cache=True, nogil=True)
 def off_line(xyz: FloatArray, i: int, mean: FloatArray, direction: FloatArray) -> float:
-    """Give the distance of point i from a line."""
+    """Return the distance of point i from a line."""
     dx, dy, dz = xyz[0, i] - mean[0], xyz[1, i] - mean[1], xyz[2, i] - mean[2]
     along = dx * direction[0] + dy * direction[1] + dz * direction[2]
     return math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - along * along))

@@ -1,7 +1,7 @@
 """Points in Morton order: a linear octree without a tree.
 
-Along the Morton (Z-order) curve the points of a cube of side 2^k are one contiguous run, at every k at once. So one
-sort gives voxels and cells of all octaves, and an order of the points that does not depend on the order they came in.
+Along the Morton (Z-order) curve the points of a cube of side 2^k are one contiguous run, for every k. So one sort gives
+the voxels and cells of all octaves, and an order of the points that does not depend on the input order.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numba import njit
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 
 BITS = 21
-"""Bits an axis: 3 x 21 fit a signed 64-bit integer."""
+"""Bits per axis: 3 x 21 fit a signed 64-bit integer."""
 GOLDEN = np.int64(-7046029254386353131)
 """2^64 over the golden ratio, as a signed integer: the multiplier of Fibonacci hashing."""
 
@@ -40,7 +40,7 @@ def _fill_codes(points: FloatArray, unit: float, most: float, codes: IndexArray)
 
 
 def morton_codes(points: FloatArray, unit: float, most: float | None = None) -> IndexArray:
-    """Give the Morton code of each point's cell.
+    """Return the Morton code of each point's cell.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def morton_codes(points: FloatArray, unit: float, most: float | None = None) -> 
     unit : float
         Side of the smallest cell.
     most : float, optional
-        Coordinates below zero or above this are taken for these.
+        Coordinates are clipped to zero and this.
 
     Returns
     -------
@@ -59,7 +59,7 @@ def morton_codes(points: FloatArray, unit: float, most: float | None = None) -> 
     Raises
     ------
     ValueError
-        If a point lies outside the cube the codes can tell apart.
+        If a point lies outside the cube that the codes cover.
     """
     if most is None and len(points) and not (points.min() >= 0 and points.max() < unit * 2**BITS):
         raise ValueError("coordinates must lie in [0, 2^21 unit)")
@@ -70,7 +70,7 @@ def morton_codes(points: FloatArray, unit: float, most: float | None = None) -> 
 
 @njit(cache=True, nogil=True)
 def find_cell(cells: IndexArray, code: int) -> int:
-    """Give the position of `code` among the sorted `cells`, -1 if that cell is empty."""
+    """Return the position of `code` among the sorted `cells`; -1 if that cell is empty."""
     low, high = 0, len(cells)
     while low < high:
         middle = (low + high) >> 1
@@ -109,7 +109,7 @@ def gather_ball(
     Returns
     -------
     int
-        How many were found; collecting ends when `found` is full.
+        Number of points found; the search ends when `found` is full.
     """
     n = 0
     square = radius * radius
@@ -141,7 +141,7 @@ def gather_ball(
 
 
 def cell_starts(codes: IndexArray, level: int) -> tuple[IndexArray, IndexArray]:
-    """Give the occupied cells of one level and where each one's run of points begins.
+    """Return the occupied cells of one level, and where the run of points of each begins.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def cell_starts(codes: IndexArray, level: int) -> tuple[IndexArray, IndexArray]:
 
 
 def group(codes: IndexArray, level: int, keep: MaskArray) -> tuple[IndexArray, IndexArray, IndexArray]:
-    """Give the points to keep, the occupied cells of one level, and where each one's run of these points begins.
+    """Return the kept points, the occupied cells of one level, and where the run of kept points of each begins.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def group(codes: IndexArray, level: int, keep: MaskArray) -> tuple[IndexArray, I
     Returns
     -------
     members : ndarray of shape (n,)
-        Indices of the points to keep, ascending.
+        Indices of the kept points, ascending.
     cells : ndarray of shape (C,)
     starts : ndarray of shape (C + 1,)
         Members `starts[c]:starts[c + 1]` lie in cell c.
@@ -229,7 +229,7 @@ def thin(codes: IndexArray, level: int, keep: MaskArray | None = None) -> IndexA
 
 
 def pick_one(cells: IndexArray, starts: IndexArray) -> IndexArray:
-    """Give one index of each cell's run, pseudo-randomly by the cell's code, shape (C,)."""
-    # a multiplicative hash: the choice depends on the place alone, not on the order of the points or on a generator
+    """Return one index of each cell's run, pseudo-randomly by the cell's code, shape (C,)."""
+    # a multiplicative hash: the choice depends only on the place, not on the order of the points or on a generator
     hashed = ((cells * GOLDEN) & 0x7FFFFFFFFFFFFFFF) >> 32
     return np.asarray(starts[:-1] + hashed % np.diff(starts), dtype=np.int64)

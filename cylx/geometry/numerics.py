@@ -1,10 +1,9 @@
-"""What the kernels compute with: linear algebra of a few rows, order statistics, and how sums may be reordered.
+"""Numerics for the kernels: linear algebra of a few rows, order statistics, and flags for the order of sums.
 
-All are scalar loops: no allocation, no LAPACK, quick to compile. A kernel that adds up over points reads them as
-`xyz`, shape (3, N), a coordinate a row, and lets the compiler add in another order than written. Then several points go
-through one of the processor's vector instructions: fits take a fifth of the time. It rounds differently from one kind
-of processor to another, as the linear algebra of NumPy does; nothing else depends on it, not even on where the points
-lie in memory.
+All are scalar loops: no allocation, no LAPACK, fast to compile. A kernel that sums over points reads them as `xyz`,
+shape (3, N), one coordinate per row, and allows the compiler to reorder the sums. Then vector instructions process
+several points at once, and fits take a fifth of the time. The rounding differs between processors, as it does in the
+linear algebra of NumPy. It depends on nothing else, not even on the alignment of the points in memory.
 """
 
 from __future__ import annotations
@@ -18,9 +17,9 @@ from numba import njit
 from cylx.geometry.arrays import FloatArray
 
 REORDERED: Final = {"reassoc", "nsz", "arcp", "contract"}
-"""What the compiler may do to sums; NaN and infinity keep their meaning."""
+"""Optimisations that the compiler may apply to sums; NaN and infinity keep their meaning."""
 FINITE: Final = REORDERED | {"nnan"}
-"""The same, for the least and the greatest of numbers that are all finite."""
+"""The same, for minima and maxima of finite numbers."""
 
 
 @njit(cache=True, nogil=True)
@@ -73,9 +72,9 @@ def symmetric_eigen(matrix: FloatArray, vectors: FloatArray) -> None:
     Parameters
     ----------
     matrix : ndarray of shape (3, 3)
-        Overwritten; the eigenvalues are left on its diagonal, in no order.
+        Overwritten; the eigenvalues are left on its diagonal, unordered.
     vectors : ndarray of shape (3, 3)
-        Overwritten with the unit eigenvectors, one a column.
+        Overwritten with the unit eigenvectors, one per column.
     """
     for i in range(3):
         for j in range(3):
@@ -122,7 +121,7 @@ def fill_basis(direction: FloatArray, basis: FloatArray) -> None:
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Give a x b of vectors in the last axis, (..., 3) each; `numpy.cross` takes ten times as long for few vectors."""
+    """Return a x b of vectors in the last axis, (..., 3) each; ten times faster than `numpy.cross` for few vectors."""
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
@@ -130,7 +129,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def sort_in_place(values: FloatArray, n: int) -> None:
-    """Sort values[:n], ascending: Shell's method with Knuth's gaps, quick to compile."""
+    """Sort values[:n] in ascending order: Shell's method with Knuth's gaps, fast to compile."""
     gap = 1
     while gap < n // 3:
         gap = 3 * gap + 1
@@ -146,8 +145,8 @@ def sort_in_place(values: FloatArray, n: int) -> None:
 
 @njit(cache=True, nogil=True)
 def median_of_positive(values: FloatArray, n: int, scratch: FloatArray) -> float:
-    """Give the median of those of values[:n] that are positive; 0 if there are none."""
-    m = np.int64(0)  # of a literal a kernel of its own would be compiled
+    """Return the median of the positive numbers of values[:n]; 0 if there are none."""
+    m = np.int64(0)  # a literal would be compiled as a separate kernel
     for i in range(n):
         if values[i] > 0.0:
             scratch[m] = values[i]

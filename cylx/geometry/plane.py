@@ -1,4 +1,4 @@
-"""The plane: a point, a normal, a frame in it."""
+"""The plane: a point, a normal, and a frame in it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Plane:
     Parameters
     ----------
     point : ndarray of shape (3,)
-        Zero of its coordinates.
+        Origin of its coordinates.
     normal : ndarray of shape (3,)
         Unit vector.
     """
@@ -26,16 +26,16 @@ class Plane:
     normal: FloatArray
 
     def project(self, points: FloatArray) -> FloatArray:
-        """Give coordinates of points (N, 3) in the plane, along the normal, shape (N, 2)."""
+        """Return coordinates of points (N, 3) projected along the normal onto the plane, shape (N, 2)."""
         first, second = axis_basis(self.normal)
         return (points - self.point) @ np.column_stack([first, second])
 
     def lift(self, coordinates: FloatArray) -> FloatArray:
-        """Give the points in space of coordinates (..., 2) in the plane, shape (..., 3)."""
+        """Return the points in space with coordinates (..., 2) in the plane, shape (..., 3)."""
         return self.point + self.lift_vectors(coordinates)
 
     def lift_vectors(self, vectors: FloatArray) -> FloatArray:
-        """Give the vectors in space of vectors (..., 2) in the plane, shape (..., 3)."""
+        """Return the vectors in space of vectors (..., 2) in the plane, shape (..., 3)."""
         return np.asarray(vectors @ np.stack(axis_basis(self.normal)))
 
 

@@ -1,8 +1,8 @@
-"""The quadric over a small piece of surface, and the cylinder that osculates it.
+"""The quadric over a small piece of surface, and its osculating cylinder.
 
 Over its own plane a small piece of surface is z = a x^2 + b x y + c y^2 + d x + e y + f. The shape operator of this
-quadric has the principal curvatures and directions; for a cylinder one curvature is 0, along the axis, and the other 1
-/ r. So a single small least-squares problem gives axis, radius and position, without normals.
+quadric gives the principal curvatures and directions. For a cylinder one curvature is 0, along the axis, and the other
+is 1 / r. So one small least-squares problem gives axis, radius and position, without normals.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def fit_plane(
     Returns
     -------
     float
-        Share of the points within three noises, 0 if those that are do not scatter like noise: an arc of a thin pipe is
-        flat within three noises, too.
+        Share of the points within three noises. It is 0 if these points do not scatter like noise, as an arc of a thin
+        pipe may also be flat within three noises.
     """
     width, sums = math.inf, np.empty(10)
     for d in range(3):
@@ -47,7 +47,7 @@ def fit_plane(
             return 0.0
         mx, my, mz = sums[1] / count, sums[2] / count, sums[3] / count
         xx, xy, xz, yy, yz, zz = sums[4], sums[5], sums[6], sums[7], sums[8], sums[9]
-        # the points lie about zero, so that little is lost by taking the means off the sums
+        # the points lie about zero, so subtracting the means from the sums loses little precision
         xx, xy, xz = xx - count * mx * mx, xy - count * mx * my, xz - count * mx * mz
         yy, yz, zz = yy - count * my * my, yz - count * my * mz, zz - count * mz * mz
         matrix[0, 0], matrix[0, 1], matrix[0, 2] = xx, xy, xz
@@ -89,7 +89,7 @@ def _fill_plane_sums(
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
 def _count_beside(xyz: FloatArray, n: int, width: float, center: FloatArray, normal: FloatArray) -> tuple[float, float]:
-    """Give the number of points within `width` of a plane, and the sum of their squared distances."""
+    """Return the number of points within `width` of a plane, and the sum of their squared distances."""
     cx, cy, cz, nx, ny, nz = center[0], center[1], center[2], normal[0], normal[1], normal[2]
     count, squares = 0.0, 0.0
     for i in range(n):
@@ -113,7 +113,7 @@ def osculating_cylinder(
     basis: FloatArray,
     local: FloatArray,
 ) -> bool:
-    """Fit a quadric over a plane to xyz[:, :n] and fill `model` (7,) with the cylinder that osculates it.
+    """Fit a quadric over a plane to xyz[:, :n], and fill `model` (7,) with its osculating cylinder.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def _fill_moments(local: FloatArray, n: int, width: float, gram: FloatArray, ter
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
 def _fill_residuals(local: FloatArray, n: int, width: float, terms: FloatArray) -> float:
-    """Fill in the residuals; give the sum of their sizes over the points whose last one was within `width`."""
+    """Fill in the residuals; return the sum of their sizes over the points whose last one was within `width`."""
     a, b, c, d, e, f = terms[0], terms[1], terms[2], terms[3], terms[4], terms[5]
     total = 0.0
     for i in range(n):

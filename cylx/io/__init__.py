@@ -1,6 +1,6 @@
-"""Files in, files out: the only room that knows paths, formats, and the libraries that read and write them.
+"""Reading and writing files: the only package that knows paths, formats, and the libraries for them.
 
-The names are resolved when they are first used: to write a text takes no numpy.
+Names are imported on first use, so that writing a text does not import numpy.
 """
 
 from __future__ import annotations

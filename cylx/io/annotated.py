@@ -1,4 +1,4 @@
-"""The annotated cloud: the points as they came, and what was found in them, as PLY, PCD, LAS or LAZ."""
+"""The annotated cloud: the points as read, with the cylinder of each, as PLY, PCD, LAS or LAZ."""
 
 from __future__ import annotations
 
@@ -31,30 +31,29 @@ _OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "b
 def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool = False) -> None:
     """Write all points of the input with all their properties, and the cylinder of each.
 
-    Every row of the input is there, in its order, as it was read: points without finite coordinates too, and those that
-    took no part. To its properties come `cylinder_id` (int, -1 for none), `residual` (float, the signed distance to
-    that cylinder's surface, + is outside, scene units, NaN for none), and `red`, `green`, `blue` (uchar) by cylinder,
-    grey for none. Properties of the input with these names, and the `alpha` of its colours, are kept as `orig_red` and
-    so on. Names that PLY cannot hold are mended; integers of 8 bytes, which PLY does not have, become double. Other
-    elements of a PLY, such as faces, are dropped.
+    Every row of the input is written, unchanged and in its order, including points without finite coordinates and
+    points that were not used. The properties added are `cylinder_id` (int, -1 for none), `residual` (float, the signed
+    distance to that cylinder's surface, + is outside, scene units, NaN for none), and `red`, `green`, `blue` (uchar) by
+    cylinder, grey for none. Properties of the input with these names, and the `alpha` of its colours, are kept as
+    `orig_red` and so on. Names that PLY cannot hold are changed. Integers of 8 bytes become double, as PLY has none.
+    Other elements of a PLY, such as faces, are dropped.
 
-    The file is a binary little endian PLY, but for a name that ends in .pcd, which gives a binary PCD, and for one in
-    .las or .laz, if the input was LAS or LAZ: `cylinder_id` and `residual` are extra bytes there, and there are colours
-    if the point format has them.
+    The file is a binary little endian PLY. A name in .pcd gives a binary PCD. A name in .las or .laz needs LAS or LAZ
+    as input: `cylinder_id` and `residual` are then extra bytes, and colours are written if the point format has them.
 
     Parameters
     ----------
     path : str or Path
         A file, or `-` for standard output.
     extraction : Extraction
-        What was found, and in which cloud.
+        The cylinders, and the cloud that they were found in.
     overwrite : bool
-        Whether a file that is there already may be replaced.
+        Whether an existing file may be replaced.
 
     Raises
     ------
     OutputError
-        If the file exists and may not be replaced, or cannot be written, or its format cannot hold the points.
+        If the file exists and may not be replaced, cannot be written, or has a format that cannot hold the points.
     """
     cloud = extraction.cloud
     check_annotated(path, cloud)
@@ -72,18 +71,18 @@ def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool
 
 
 def check_annotated(path: str | Path, cloud: PointCloud) -> None:
-    """Refuse a format that could not hold the points of a cloud, before anything is computed for it.
+    """Refuse a format that cannot hold the points of a cloud, before anything is computed for it.
 
     Parameters
     ----------
     path : str or Path
-        Where the annotated cloud is to go.
+        Name of the annotated cloud.
     cloud : PointCloud
 
     Raises
     ------
     OutputError
-        If it is LAS or LAZ, and the cloud does not come from either, or PCD, and a property is a list.
+        If it is LAS or LAZ and the cloud is from neither, or PCD and a property is a list.
     """
     suffix = Path(path).suffix.lower()
     if suffix in LAS_SUFFIXES and (cloud.source.header is None or cloud.table is None):
@@ -97,7 +96,7 @@ def check_annotated(path: str | Path, cloud: PointCloud) -> None:
 
 
 def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:
-    """Say under which name and type each property of the input is kept, by the name it has there."""
+    """Return the output name and type of each property of the input, by its input name."""
     if cloud.table is None:
         return {axis: (axis, np.dtype("<f8")) for axis in "xyz"}
     names = cloud.table.dtype.names or ()
@@ -116,7 +115,7 @@ def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:
 
 
 def _columns(cloud: PointCloud) -> Mapping[str, NDArray[Any]] | NDArray[np.void]:
-    """Give what the input says of its rows, by name; the rows that an array of points had in excess are NaN."""
+    """Return the properties of all rows by name; rows of an array without finite coordinates are NaN."""
     if cloud.table is not None:
         return cloud.table
     return {axis: cloud.spread(cloud.points[:, place], np.nan) for place, axis in enumerate("xyz")}
@@ -136,7 +135,7 @@ def _blocks(
 
 
 def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray[Any]]]]:
-    """Give what was found about the rows, piece by piece, by the names of our properties."""
+    """Yield the results for the rows, piece by piece, by the names of our properties."""
     cloud = extraction.cloud
     labels = cloud.spread(extraction.labels, -1)
     residuals = cloud.spread(extraction.residuals, np.nan)
@@ -149,7 +148,7 @@ def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray
 
 
 def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> None:
-    """Write LAS or LAZ, by way of an unnamed file where the output has no positions."""
+    """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek."""
     from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
 
     header, table = extraction.cloud.source.header, extraction.cloud.table

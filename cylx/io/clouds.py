@@ -1,4 +1,4 @@
-"""Point clouds from files of any format, and into them."""
+"""Read and write point clouds of any supported format."""
 
 from __future__ import annotations
 
@@ -30,24 +30,24 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
     Parameters
     ----------
     path : str or Path
-        A PLY, PCD, text, LAS, LAZ, E57, NPY or NPZ file, packed by gzip or not, or `-` for standard input.
+        A PLY, PCD, text, LAS, LAZ, E57, NPY or NPZ file, optionally packed by gzip, or `-` for standard input.
     format : {"ply", "pcd", "xyz", "las", "e57", "npy"}, optional
-        What it is; by default the suffix says so, and where it does not, the content. LAZ is `las`, NPZ is `npy`.
+        Its format; by default from the suffix, or else from the content. LAZ is `las`, NPZ is `npy`.
     scan : int, optional
-        The scan of an E57 file to read, the first is 0; by default all.
+        Number of the scan of an E57 file to read, from 0; by default all.
 
     Returns
     -------
     PointCloud
-        Its points in float64. Rows with a coordinate that is not finite are in its table only.
+        The points in float64. Rows with a coordinate that is not finite are only in its table.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is damaged, has no finite point or not that scan, or needs a library that is not
+        If the file cannot be read, is damaged, has no finite point, lacks the scan, or needs a library that is not
         installed.
     UsageError
-        If `format` is none of those above.
+        If `format` is unknown.
     """
     if format is not None and format not in FORMATS:
         raise UsageError("format", f"unknown format {format!r}", f"use one of {', '.join(FORMATS)}")
@@ -55,7 +55,7 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
     with open_input(path) as file, unpacked(file, packed=packed) as source:
         kind = format or recognise(source, cloud_suffix(path))
         if scan is not None and kind != "e57":
-            raise InputError(source.place, "is no E57 file, of which a scan could be chosen", "leave --scan out")
+            raise InputError(source.place, "is not E57, so no scan can be chosen", "leave --scan out")
         try:
             table, header = _read(source, kind, scan)
         except MemoryError:
@@ -65,12 +65,12 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
 
 
 def recorded_name(path: str | Path) -> str:
-    """Give the name by which a result calls a file: without its folder, in characters that UTF-8 has."""
+    """Return the name of a file in a result: without its folder, in valid UTF-8."""
     return Path(_file_name(path)).name
 
 
 def cloud_suffixes() -> tuple[str, ...]:
-    """Give the small suffixes of the files that are taken for clouds in a folder; arrays may be anything."""
+    """Return the suffixes, in lower case, of the files in a folder that count as clouds; NPY may hold anything else."""
     return (".ply", ".pcd", *TEXT_SUFFIXES, *LAS_SUFFIXES, ".e57")
 
 
@@ -82,7 +82,7 @@ def write_cloud(
     overwrite: bool = False,
     dtype: Literal["f4", "f8"] = "f8",
 ) -> None:
-    """Write points and their properties as binary PLY, binary PCD or text, as the suffix says; `-` is PLY.
+    """Write points and properties as binary PLY, binary PCD or text, depending on the suffix; `-` is PLY.
 
     Parameters
     ----------
@@ -91,9 +91,9 @@ def write_cloud(
     points : ndarray of shape (N, 3)
         Scene units.
     properties : mapping of str to ndarray of shape (N,), optional
-        Further properties, in their order, in their types as far as the format has them.
+        Further properties, in their order, with their types if the format has them.
     overwrite : bool
-        Whether a file that is there already may be replaced.
+        Whether an existing file may be replaced.
     dtype : {"f8", "f4"}
         Type of the coordinates.
 
@@ -118,12 +118,12 @@ def write_cloud(
 
 
 def _file_name(path: str | Path) -> str:
-    """Give the name of a file as it can be written as UTF-8."""
+    """Return the name of a file in valid UTF-8."""
     return str(path).encode("utf-8", "replace").decode()
 
 
 def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], bytes | None]:
-    """Read the table of a file, and what a LAS file has besides; readers that few need are imported late."""
+    """Read the table of a file, and the header of a LAS file; rarely needed readers are imported late."""
     if kind == "las":
         from cylx.io.las import read_las  # noqa: PLC0415  needs an extra, or for this alone
         from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  needs an extra, or for this alone
@@ -169,7 +169,7 @@ def _table(points: NDArray[Any], properties: Mapping[str, NDArray[Any]], dtype: 
 
 
 def _plain_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Give the number type, common to PLY and PCD but for integers of 8 bytes, that holds values of a type."""
+    """Return the number type to write a type in; PLY and PCD share these, except integers of 8 bytes."""
     if dtype.kind not in "biuf":
         raise ValueError(f"a property must be made of numbers, not of {dtype}")
     if dtype.kind == "f":

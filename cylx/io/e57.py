@@ -1,4 +1,4 @@
-"""E57: the points of all its scans, each moved to where its scanner stood, read by pye57."""
+"""Read E57 by pye57: the points of all scans, moved by the poses of their scanners."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
 _INVALID = ("cartesianInvalidState", "sphericalInvalidState")
 _NAMES = {"colorRed": "red", "colorGreen": "green", "colorBlue": "blue"}
-_BUFFERS = ("i1", "u1", "i2", "u2", "f4", "f8")  # what libE57 fills; of the others it fills int64
+_BUFFERS = ("i1", "u1", "i2", "u2", "f4", "f8")  # types that libE57 fills; other integers are read as int64
 _REMEDY = "get a complete copy of the file"
 
 
@@ -39,14 +39,14 @@ class _Scan:
     Parameters
     ----------
     points : object
-        Its points, as pye57 has them.
+        The points, an object of pye57.
     count : int
-        How many.
+        Number of points.
     fields : dict of str to dtype
-        What is known of each of them.
+        Type of each field.
     rotation : ndarray of shape (3, 3)
     translation : ndarray of shape (3,)
-        Where the scanner stood.
+        Pose of the scanner.
     """
 
     points: Any
@@ -57,7 +57,7 @@ class _Scan:
 
     @property
     def kept(self) -> dict[str, np.dtype[Any]]:
-        """What becomes a property of the points."""
+        """The fields that become properties of the points."""
         return {n: kind for n, kind in self.fields.items() if n not in (*_CARTESIAN, *_SPHERICAL, *_INVALID)}
 
 
@@ -73,16 +73,16 @@ def read_e57(source: Input, scan: int | None = None) -> NDArray[np.void]:
     Returns
     -------
     ndarray of shape (points,), structured
-        `x`, `y`, `z` in float64, moved to the coordinates of the file, NaN where the file says that they are invalid;
-        `scan`, the number of the scan; and all other fields of numbers, 0 or NaN in scans that lack them.
+        `x`, `y`, `z` in float64, in the coordinates of the file, NaN where the file marks them as invalid; `scan`, the
+        number of the scan; and all other numeric fields, 0 or NaN in scans that lack them.
 
     Raises
     ------
     InputError
-        If this is no E57, it is damaged, has no points or not that scan, or pye57 is not installed.
+        If this is not E57, is damaged, has no points, lacks the scan, or pye57 is not installed.
     """
     if source.head(8) != b"ASTM-E57":
-        raise InputError(source.place, "is no E57: it does not begin with ASTM-E57", "give it its right suffix")
+        raise InputError(source.place, "is not E57: it does not begin with ASTM-E57", "give it its right suffix")
     require("pye57", place=source.place, needed_by="", error=InputError)
     from pye57 import E57, libe57  # noqa: PLC0415  an extra
 
@@ -96,7 +96,7 @@ def read_e57(source: Input, scan: int | None = None) -> NDArray[np.void]:
 
 @contextmanager
 def _named(source: Input) -> Iterator[Path]:
-    """Give the name of an input, which libE57 asks for; what has none is copied."""
+    """Yield a file name for libE57; an input without a name is copied to a temporary file."""
     if source.path is not None:
         yield source.path
         return
@@ -149,7 +149,7 @@ def _describe(file: Any, number: int, place: str) -> _Scan:  # noqa: ANN401  (of
 
 
 def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa: ANN401  (of pye57)
-    """Give rotation (3, 3) and translation (3,) of a scan; by name, as their order in the file is not fixed."""
+    """Return rotation (3, 3) and translation (3,) of a scan; read by name, as the order in the file is not fixed."""
     rotation, translation = np.eye(3), np.zeros(3)
     if not node.isDefined("pose"):
         return rotation, translation
@@ -160,7 +160,7 @@ def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa
         whole = np.array([pose["rotation"][part].value() for part in "wxyz"], dtype=np.float64)
         length = np.linalg.norm(whole)
         if not (0 < length < np.inf):
-            raise ValueError("the rotation of a pose is none")
+            raise ValueError("the rotation of a pose is invalid")
         w, x, y, z = whole / length
         rotation = np.array(
             [
@@ -173,7 +173,7 @@ def _pose(node: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa
 
 
 def _type(node: Any) -> np.dtype[Any] | None:  # noqa: ANN401  (of pye57)
-    """Give the smallest type that holds all that a field may be; None if it is no number."""
+    """Return the smallest type that holds all values of a field; None if it is not numeric."""
     from pye57 import libe57  # noqa: PLC0415  an extra
 
     if isinstance(node, libe57.FloatNode):
@@ -229,7 +229,7 @@ def _fill(
 
 
 def _coordinates(read: dict[str, NDArray[Any]]) -> NDArray[np.float64]:
-    """Give the coordinates as the scanner saw them, (n, 3); NaN where they are invalid."""
+    """Return the coordinates in the frame of the scanner, (n, 3); NaN where they are invalid."""
     if read.keys() >= set(_CARTESIAN):
         points = np.column_stack([read[name] for name in _CARTESIAN])
         invalid = read.get(_INVALID[0])

@@ -1,4 +1,4 @@
-"""Which format a file has: told by its suffix, and where that does not say, by its first bytes."""
+"""Find the format of a file by its suffix, or else by its first bytes."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _BEGINNINGS = {
 
 
 def cloud_suffix(path: str | Path) -> str:
-    """Give the suffix of a cloud in small letters; `.gz` is none.
+    """Return the suffix of a cloud in lower case; `.gz` is ignored.
 
     Examples
     --------
@@ -44,7 +44,7 @@ def cloud_suffix(path: str | Path) -> str:
 
 
 def cloud_name(path: str | Path) -> str:
-    """Give a path without its `.gz`, if it has one.
+    """Return a path without its `.gz`, if it has one.
 
     Examples
     --------
@@ -56,13 +56,13 @@ def cloud_name(path: str | Path) -> str:
 
 
 def recognise(source: Input, suffix: str) -> str:
-    """Tell the format of an input, one of `FORMATS`.
+    """Find the format of an input, one of `FORMATS`.
 
     Parameters
     ----------
     source : Input
     suffix : str
-        That of its name, in small letters.
+        Suffix of its name, in lower case.
 
     Raises
     ------
@@ -76,5 +76,5 @@ def recognise(source: Input, suffix: str) -> str:
         if head.startswith(beginning):
             return kind
     if suffix not in TEXT_SUFFIXES and b"\0" in head:
-        raise InputError(source.place, "is of no format that cylx reads, and no text", "convert it to PLY")
+        raise InputError(source.place, "is neither text nor of a format that cylx reads", "convert it to PLY")
     return "xyz"

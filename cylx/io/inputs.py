@@ -1,4 +1,4 @@
-"""Inputs on disk or standard input, opened once, measured and hashed before anybody looks into them."""
+"""Inputs from disk or standard input, opened once, measured and hashed before they are read."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ class Input:
     Parameters
     ----------
     place : str
-        What errors call it.
+        Its name in errors.
     file : binary file
         A real file, so that it can be mapped into memory.
     size : int
-        Bytes in it.
+        Size in bytes.
     sha256 : str
-        Digest of these bytes.
+        Digest of the bytes.
     path : Path or None
-        Its name; None if it has none, or another than its content.
+        Its path; None if it has no path, or the file at the path has other content.
     """
 
     place: str
@@ -47,19 +47,19 @@ class Input:
     path: Path | None = None
 
     def head(self, size: int) -> bytes:
-        """Give up to `size` bytes from the beginning."""
+        """Return up to `size` bytes from the beginning."""
         self.file.seek(0)
         return self.file.read(size)
 
 
 @contextmanager
 def open_input(path: str | Path) -> Iterator[Input]:
-    """Open a file, a pipe or standard input (`-`); what has no positions is copied to an unnamed file first.
+    """Open a file, a pipe or standard input (`-`); inputs that cannot seek are copied to an unnamed file first.
 
     Raises
     ------
     InputError
-        If there is nothing there, or nothing in it, or it may not be read.
+        If it does not exist, is empty, or cannot be read.
     """
     place = "standard input" if str(path) == "-" else printable(path)
     with _open(path, place) as stream:
@@ -100,12 +100,12 @@ def read_json(path: str | Path) -> dict[str, Any]:
         fault = "nested too deeply" if isinstance(error, RecursionError) else str(error)
         raise InputError(place, f"not JSON: {fault}", "give a JSON file as cylx writes it") from None
     if not isinstance(document, dict):
-        raise InputError(place, "holds no JSON object", "give a JSON file as cylx writes it")
+        raise InputError(place, "is not a JSON object", "give a JSON file as cylx writes it")
     return document
 
 
 def sha256_of(path: str | Path) -> str:
-    """Give the digest of the bytes of a file.
+    """Return the digest of the bytes of a file.
 
     Raises
     ------
@@ -117,12 +117,12 @@ def sha256_of(path: str | Path) -> str:
 
 
 def printable(path: str | Path) -> str:
-    """Give a path as one line that can be printed, whatever is in it."""
+    """Return a path as one printable line, whatever it contains."""
     return text if (text := str(path)).isprintable() else repr(text)
 
 
 def excerpt(text: str) -> str:
-    """Quote a piece of somebody's file so that it fits on one line of ours."""
+    """Quote a piece of a file so that it fits on one line of a message."""
     return ascii(text if len(text) <= 40 else text[:37] + "...")
 
 

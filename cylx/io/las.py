@@ -1,4 +1,4 @@
-"""LAS and LAZ: all dimensions of all points, read by laspy piece by piece."""
+"""LAS and LAZ: all dimensions of all points, read by laspy in pieces."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _REMEDY = "get a complete copy of the file"
 
 @dataclass(frozen=True, slots=True)
 class Dimension:
-    """A column of the table: its name there, its type, and the dimension, and element of it, that it comes from."""
+    """A column of the table: its name, its type, and the dimension, and element of it, that it comes from."""
 
     name: str
     type: np.dtype[Any]
@@ -36,7 +36,7 @@ class Dimension:
     element: int | None = None
 
     def of(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Give the column's part of the values of its dimension."""
+        """Return the values of the column from the values of its dimension."""
         return values if self.element is None else values[:, self.element]
 
 
@@ -50,13 +50,13 @@ def read_las(source: Input) -> NDArray[np.void]:
     Returns
     -------
     ndarray of shape (points,), structured
-        `x`, `y` and `z` in float64, scale and offset applied, and all other dimensions, those in extra bytes too; a
+        `x`, `y` and `z` in float64 with scale and offset applied, and all other dimensions including extra bytes; a
         dimension `d` of several values as `d_0`, `d_1` and so on.
 
     Raises
     ------
     InputError
-        If this is no LAS, it is damaged or shorter than its header says, or laspy or lazrs is not installed.
+        If this is not LAS, is damaged or shorter than its header says, or laspy or lazrs is not installed.
     """
     facts = las_header(source)
     libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
@@ -66,7 +66,7 @@ def read_las(source: Input) -> NDArray[np.void]:
 
 
 def las_dimensions(point_format: Any) -> list[Dimension]:  # noqa: ANN401  (of laspy)
-    """Say which columns the points of a format have besides x, y and z, in the order of the file."""
+    """Return the columns of a point format besides x, y and z, in the order of the file."""
     found = []
     for one in point_format.dimensions:
         if one.name in ("X", "Y", "Z"):
@@ -80,7 +80,7 @@ def las_dimensions(point_format: Any) -> list[Dimension]:  # noqa: ANN401  (of l
 
 @contextmanager
 def quiet_laspy() -> Iterator[None]:
-    """Keep laspy from telling on standard error what it raises besides, or what is found out here."""
+    """Suppress messages of laspy on standard error that repeat its exceptions or our own checks."""
     logger = logging.getLogger("laspy")
     level = logger.level
     logger.setLevel(logging.CRITICAL + 1)
@@ -116,7 +116,7 @@ def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
 
 
 def _check_chunks(source: Input, facts: LasFacts, header: Any) -> None:  # noqa: ANN401  (of laspy)
-    """Check where the compressed chunks lie: lazrs takes memory for as many and as long ones as it is told of."""
+    """Check the table of compressed chunks: lazrs allocates memory for whatever numbers and sizes it gives."""
     import lazrs  # noqa: PLC0415  an extra
 
     record = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
@@ -125,7 +125,7 @@ def _check_chunks(source: Input, facts: LasFacts, header: Any) -> None:  # noqa:
         raise damaged
     source.file.seek(facts.start)
     table = _whole(source)
-    if table == -1:  # it was not known when the points were written
+    if table == -1:  # its position was unknown when the points were written
         source.file.seek(source.size - 8)
         table = _whole(source)
     if not facts.start + 8 <= table <= source.size - 8:
@@ -147,7 +147,7 @@ def _whole(source: Input) -> int:
 
 @contextmanager
 def _told_apart(place: str) -> Iterator[None]:
-    """Turn what laspy and lazrs raise on a damaged file into an error of the file."""
+    """Turn exceptions of laspy and lazrs on a damaged file into an `InputError`."""
     import laspy  # noqa: PLC0415  an extra
 
     damaged: tuple[type[Exception], ...] = (laspy.errors.LaspyException, ValueError, KeyError, IndexError)

@@ -1,4 +1,4 @@
-"""The annotated LAS or LAZ: the file as it came, and the cylinder of each point in extra bytes."""
+"""The annotated LAS or LAZ: the file as read, with the cylinder of each point in extra bytes."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ def write_las(
 ) -> None:
     """Write the points of a LAS file again, with the cylinder of each.
 
-    The point format stays, and so do version, scales, offsets and the small records, such as that of the coordinate
-    system. Extra bytes with our names, and colours that are not all 0, are kept as `orig_red` and so on.
+    Point format, version, scales, offsets and the small records, such as the coordinate system, are kept. Extra bytes
+    with our names, and colours that are not all 0, are kept as `orig_red` and so on.
 
     Parameters
     ----------
     file : binary file
-        One that can be read from any position.
+        A file that can seek.
     kept : bytes
-        What the file had besides its points.
+        The rest of the input file, see `kept_header`.
     table : ndarray of shape (points,), structured
-        Its points, as they were read.
+        The points as read.
     blocks : iterable of (slice, mapping)
         `cylinder_id`, `residual`, `red`, `green` and `blue` of the points, piece by piece.
     compressed : bool
@@ -73,7 +73,7 @@ def write_las(
 
 
 def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: ANN401  (of laspy)
-    """Make room for our dimensions in a header; gives the new names of dimensions, of colours under `red+`."""
+    """Add our dimensions to a header, and return the new names of dimensions, those of colours under `red+`."""
     import laspy  # noqa: PLC0415  an extra
 
     point_format = header.point_format
@@ -89,7 +89,7 @@ def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: A
         params += [laspy.ExtraBytesParams(renamed[f"{color}+"], "u2") for color in _COLORS]
     header.add_extra_dims(params)
     header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]
-    header.creation_date = header.creation_date or _NO_DATE  # laspy would say today
+    header.creation_date = header.creation_date or _NO_DATE  # laspy would write today
     header.start_of_waveform_data_packet_record = 0
     header.global_encoding.waveform_data_packets_internal = False
     return renamed
@@ -100,7 +100,7 @@ def _is_colored(header: Any) -> bool:  # noqa: ANN401  (of laspy)
 
 
 def _new_name(name: str, taken: list[str]) -> str:
-    """Give the name to keep a property under, of at most 32 letters, which LAS allows."""
+    """Return the name to keep a property under, of at most 32 letters, the limit of LAS."""
     new, count = f"orig_{name}", 1
     while new in taken:
         count += 1
@@ -110,7 +110,7 @@ def _new_name(name: str, taken: list[str]) -> str:
 
 
 def _put(record: Any, name: str, element: int | None, values: NDArray[Any]) -> None:  # noqa: ANN401  (of laspy)
-    """Put a column of the table where it was in the file."""
+    """Write a column of the table to its dimension of the file."""
     about = record.point_format.dimension_by_name(name)
     if about.is_scaled:
         place = element or 0

@@ -1,4 +1,4 @@
-"""The header of a LAS file, checked against itself and against the size of the file before laspy reads it."""
+"""The header of a LAS file, checked for consistency and against the size of the file before laspy reads it."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ if TYPE_CHECKING:
     from cylx.io.inputs import Input
 
 _LEAST = 227  # bytes of a header before version 1.3
-_WITH_COUNT = 375  # bytes of one of version 1.4, whose counts have eight
+_WITH_COUNT = 375  # bytes of a header of version 1.4, with counts of eight bytes
 _LAST_FORMAT = 10
-_VLR, _EVLR = 54, 60  # bytes before the data of each
+_VLR, _EVLR = 54, 60  # bytes in front of the data of each record
 _LARGEST_EVLR = 1 << 20
-_MOST_STEPS = 2.0**31  # of a scale, from the offset
+_MOST_STEPS = 2.0**31  # from the offset, in steps of the scale
 _REMEDY = "get a complete copy of the file"
 
 
 @dataclass(frozen=True, slots=True)
 class LasFacts:
-    """What a header says.
+    """The contents of a header.
 
     Parameters
     ----------
     points : int
-        How many points there are.
+        Number of points.
     compressed : bool
         Whether they are compressed, as in LAZ.
     start : int
-        The byte at which they begin.
+        Byte at which the points begin.
     evlrs : tuple of int
-        The byte at which the records after them begin, and their number.
+        Byte at which the records after the points begin, and their number.
     """
 
     points: int
@@ -50,11 +50,11 @@ def las_header(source: Input) -> LasFacts:
     Raises
     ------
     InputError
-        If this is no LAS, holds no points, contradicts itself, or is shorter than its header says.
+        If this is not LAS, holds no points, contradicts itself, or is shorter than its header says.
     """
     place, head = source.place, source.head(_WITH_COUNT)
     if head[:4] != b"LASF":
-        raise InputError(place, "is no LAS: it does not begin with LASF", "give it its right suffix")
+        raise InputError(place, "is not LAS: it does not begin with LASF", "give it its right suffix")
     if len(head) < _LEAST:
         raise InputError(place, "the file ends within the LAS header", _REMEDY)
     minor = head[25]
@@ -83,10 +83,10 @@ def las_header(source: Input) -> LasFacts:
 
 
 def kept_header(source: Input, facts: LasFacts) -> bytes:
-    """Give what a LAS file has besides its points, so that it can be written again with others.
+    """Return the parts of a LAS file that are kept when it is written again with other points.
 
-    That is the header and all records before the points, and of those after them the small ones: neither waveforms nor
-    the index of a COPC file, which would be wrong afterwards.
+    These are the header, all records before the points, and the small records after them. Waveforms and the index of a
+    COPC file are left out, as they would be wrong afterwards.
     """
     source.file.seek(0)
     head = bytearray(source.file.read(facts.start))

@@ -1,4 +1,4 @@
-"""The triangles of a PLY file, where it is a mesh."""
+"""Read the triangles of a PLY file that is a mesh."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def read_object(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64
     Parameters
     ----------
     path : str or Path
-        Any cloud that can be read; of PLY files, meshes too.
+        Any supported cloud; a PLY may be a mesh.
 
     Returns
     -------
@@ -36,16 +36,16 @@ def read_object(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64
     Raises
     ------
     InputError
-        If the file cannot be read, its faces are no triangles, or they name points that there are not.
+        If the file cannot be read, its faces are not triangles, or they refer to missing points.
     """
     cloud = read_cloud(path)
     if cloud.source.format != "ply":
         return cloud.points, None
     if not Path(path).is_file():
-        raise InputError(printable(path), "is no file, and a mesh is read twice", "save it to a file")
+        raise InputError(printable(path), "is not a file, and a mesh has to be read twice", "save it to a file")
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of empty lists
+            warnings.simplefilter("ignore")  # about empty lists
             elements = PlyData.read(str(path))
     except (PlyParseError, ValueError, OverflowError, MemoryError) as error:
         raise InputError(printable(path), f"its faces cannot be read: {error}", "save the mesh again") from None
@@ -55,11 +55,11 @@ def read_object(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64
         return cloud.points, None
     kind = faces.ply_property(name)
     if not isinstance(kind, PlyListProperty) or kind.val_dtype[0] not in "iu":
-        raise InputError(printable(path), f"the property {name} is no list of integers", "save the mesh again")
+        raise InputError(printable(path), f"the property {name} is not a list of integers", "save the mesh again")
     rows = faces[name]
     if any(len(row) != 3 for row in rows):
-        raise InputError(printable(path), "has faces that are no triangles", "triangulate the mesh")
+        raise InputError(printable(path), "has faces that are not triangles", "triangulate the mesh")
     triangles = np.array([np.asarray(row) for row in rows], dtype=np.int64)
     if cloud.valid is not None or triangles.min() < 0 or triangles.max() >= len(cloud.points):
-        raise InputError(printable(path), "has faces of points that there are not", "save the mesh again")
+        raise InputError(printable(path), "has faces that refer to missing points", "save the mesh again")
     return cloud.points, triangles

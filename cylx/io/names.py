@@ -1,4 +1,4 @@
-"""Names of properties: which of them are coordinates, and what to call those that a file cannot hold."""
+"""Names of properties: find the coordinates, and replace names that a file cannot hold."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def coordinate_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Find the properties x, y and z, in this order; capital letters will do where there are no small ones.
+    """Find the properties x, y and z, in this order; capital letters are accepted if there are no small ones.
 
     Returns
     -------
@@ -27,7 +27,7 @@ def coordinate_names(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def missing_coordinates(names: Iterable[str]) -> str:
-    """Name the coordinates that are not among `names`, for an error.
+    """Return the coordinates that are not among `names`, for an error.
 
     Examples
     --------
@@ -39,7 +39,7 @@ def missing_coordinates(names: Iterable[str]) -> str:
 
 
 def mended_names(names: Sequence[str]) -> list[str]:
-    """Make names that PLY can hold: printable ASCII without spaces, none of them twice.
+    """Turn names into ones that PLY can hold: printable ASCII without spaces, no name twice.
 
     Examples
     --------

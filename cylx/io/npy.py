@@ -1,4 +1,4 @@
-"""NPY and NPZ: an array of numpy, of which the first three columns or the fields x, y and z are the coordinates."""
+"""NPY and NPZ: an array of numpy whose first three columns, or fields x, y and z, are the coordinates."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 
 _NPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"
 _MOST_COLUMNS = 1000
-_LYING = 9  # three rows of more columns are rather three columns of points
-_ENOUGH = 1 << 20  # no header is as long
+_LYING = 9  # an array of three rows and more columns than this is probably transposed
+_ENOUGH = 1 << 20  # longer than any header
 _REMEDY = "save it again by numpy.save"
 
 
 def read_npy(source: Input) -> NDArray[np.void]:
-    """Read an array of numbers from NPY, or the only one, or the one called `points`, from NPZ.
+    """Read an array of numbers from NPY, or from NPZ its only array or the one called `points`.
 
     Parameters
     ----------
@@ -37,13 +37,13 @@ def read_npy(source: Input) -> NDArray[np.void]:
     Returns
     -------
     ndarray of shape (N,), structured
-        The columns `x`, `y`, `z`, `column_4` and so on of an (N, 3) or wider array, or the fields of a structured one,
-        a field `f` of several values as `f_0`, `f_1` and so on; mapped from the file where numpy allows it.
+        The columns `x`, `y`, `z`, `column_4` and so on of an (N, 3) or wider array, or the fields of a structured
+        array, with a field `f` of several values as `f_0`, `f_1` and so on; mapped from the file if numpy allows it.
 
     Raises
     ------
     InputError
-        If it is no such array, holds Python objects, or is damaged.
+        If there is no such array, or it holds Python objects or is damaged.
     """
     head = source.head(6)
     if head == _NPY:
@@ -60,10 +60,10 @@ def _read_packed(source: Input) -> NDArray[np.void]:
                 size = copy_unpacked(stream, copy, source)
             part = Input(source.place, copy, size, source.sha256)
             if part.head(6) != _NPY:
-                raise InputError(source.place, "what is packed is no NPY", "save it again by numpy.savez")
+                raise InputError(source.place, "holds a member that is not NPY", "save it again by numpy.savez")
             return _columns(_mapped(part), source.place)
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:  # RuntimeError: a password
-        raise InputError(source.place, f"is no whole NPZ: {error}", "get a complete copy of the file") from None
+        raise InputError(source.place, f"is not a complete NPZ: {error}", "get a complete copy of the file") from None
 
 
 def _member(names: list[str], place: str) -> str:
@@ -78,11 +78,11 @@ def _member(names: list[str], place: str) -> str:
 
 
 def _mapped(source: Input) -> NDArray[Any]:
-    """Map an array from its file; what its header says is held against the file first."""
+    """Map an array from its file, after its header has been checked against the file size."""
     head = io.BytesIO(source.head(_ENOUGH))
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of headers from Python 2
+            warnings.simplefilter("ignore")  # about headers from Python 2
             version = np.lib.format.read_magic(head)
             read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
             shape, fortran, dtype = read(head)
@@ -90,7 +90,7 @@ def _mapped(source: Input) -> NDArray[Any]:
         fault = str(error).partition("\n")[0]
         raise InputError(source.place, f"broken NPY header: {fault}", _REMEDY) from None
     if dtype.hasobject:
-        raise InputError(source.place, "holds Python objects, which are not read", "save an array of numbers")
+        raise InputError(source.place, "holds Python objects, which are not supported", "save an array of numbers")
     _check_kind(dtype, shape, source.place)
     held = (source.size - head.tell()) // max(dtype.itemsize * (shape[1] if len(shape) == 2 else 1), 1)
     if held < shape[0]:
@@ -116,7 +116,7 @@ def _check_kind(dtype: np.dtype[Any], shape: tuple[int, ...], place: str) -> Non
 
 
 def _columns(array: NDArray[Any], place: str) -> NDArray[np.void]:
-    """Give an array as a structured one of plain columns, without copying it if that can be."""
+    """Return an array as a structured array of plain columns, without copying if possible."""
     if array.dtype.names is None:
         names = ["x", "y", "z", *(f"column_{column}" for column in range(4, array.shape[1] + 1))]
         kind = _plain(array.dtype)
@@ -137,7 +137,7 @@ def _columns(array: NDArray[Any], place: str) -> NDArray[np.void]:
 
 
 def _field(array: NDArray[np.void], name: str, place: str) -> list[tuple[str, NDArray[Any]]]:
-    """Give the columns of a field."""
+    """Return the columns of a field."""
     values = array[name]
     if values.dtype.kind not in "biuf":
         fault = f"the field {excerpt(name)} is made of {values.dtype}, not of numbers"
@@ -145,13 +145,13 @@ def _field(array: NDArray[np.void], name: str, place: str) -> list[tuple[str, ND
     if values.ndim == 1:
         return [(name, values)]
     if name.lower() in ("x", "y", "z"):
-        raise InputError(place, f"the field {name} has several values a point", "give one x, y and z a point")
+        raise InputError(place, f"the field {name} has several values per point", "give one x, y and z per point")
     flat = values.reshape(len(values), -1)
     return [(f"{name}_{column}", flat[:, column]) for column in range(flat.shape[1])]
 
 
 def _plain(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Give the type that files of points have for a type of numpy."""
+    """Return the type in our tables for a numpy type."""
     if dtype.kind == "b":
         return np.dtype("u1")
     if dtype.kind == "f" and dtype.itemsize not in (4, 8):

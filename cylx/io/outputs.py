@@ -1,7 +1,7 @@
-"""Outputs that appear whole or not at all, one or several together.
+"""Outputs that are written completely or not at all, one or several together.
 
-Until then they are temporary files beside what they become: their names tell whose they are, so that what the dead left
-can go.
+Unfinished outputs are temporary files in the same folder. Their names contain the machine and the process, so that
+files left by a dead process can be removed.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _NAME = re.compile(r"\.cylx-([0-9a-f]{8})-(\d+)-[0-9a-f]{16}(\..*)?", re.DOTALL)
 
 
 def check_writable(path: str | Path, *, overwrite: bool) -> None:
-    """Refuse an output that could not be written, before anything is computed for it.
+    """Refuse an output that cannot be written, before anything is computed for it.
 
     Parameters
     ----------
     path : str or Path
         A file, or `-` for standard output.
     overwrite : bool
-        Whether a file that is there already may be replaced.
+        Whether an existing file may be replaced.
 
     Raises
     ------
@@ -66,27 +66,27 @@ def check_writable(path: str | Path, *, overwrite: bool) -> None:
 
 @contextmanager
 def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
-    """Open an output under a temporary name and move it to its own when all went well.
+    """Open an output under a temporary name and rename it at the end if all went well.
 
-    Symbolic links are followed. Standard output, devices and pipes are written to as they are. A closed pipe raises
-    `BrokenPipeError`, which is nobody's fault.
+    Symbolic links are followed. Standard output, devices and pipes are written directly. A closed pipe raises
+    `BrokenPipeError`, which is not reported as an error.
 
     Parameters
     ----------
     path : str or Path
         A file, or `-` for standard output.
     overwrite : bool
-        Whether a file that is there already may be replaced.
+        Whether an existing file may be replaced.
 
     Raises
     ------
     OutputError
-        If the output is refused by `check_writable`, or cannot be written after all.
+        If `check_writable` refuses the output, or writing fails.
     """
     check_writable(path, overwrite=overwrite)
     try:
         if str(path) in _STDOUT:
-            sys.stdout.flush()  # whatever was printed comes first
+            sys.stdout.flush()  # earlier output comes first
             yield sys.stdout.buffer
             sys.stdout.buffer.flush()
         elif stat.S_ISREG(_mode(path) or stat.S_IFREG):
@@ -102,33 +102,33 @@ def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
 
 
 def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = False) -> None:
-    """Write bytes to a file, or to standard output for `-`; whole or not at all.
+    """Write bytes to a file, or to standard output for `-`; completely or not at all.
 
     Raises
     ------
     OutputError
-        If that is not possible.
+        If the file cannot be written.
     """
     with open_output(path, overwrite=overwrite) as file:
         file.write(data)
 
 
 def write_text(path: str | Path, text: str, *, overwrite: bool = False) -> None:
-    """Write text as UTF-8, line ends as given, to a file or to standard output for `-`; whole or not at all.
+    """Write text as UTF-8, with line ends as given, to a file or to standard output for `-`; completely or not at all.
 
     Raises
     ------
     OutputError
-        If that is not possible.
+        If the file cannot be written.
     """
     write_bytes(path, text.encode("utf-8"), overwrite=overwrite)
 
 
 @contextmanager
 def moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[str | Path]:
-    """Give a temporary name beside `name`, moved there if all goes well, removed if not.
+    """Yield a temporary name beside `name`; it is renamed to `name` if all goes well, and removed otherwise.
 
-    A stream or a device has no other name than its own.
+    Streams and devices are yielded as they are.
     """
     if name == STREAM or not (Path(name).is_file() or not Path(name).exists()):
         yield name
@@ -145,9 +145,9 @@ def write_together(contents: Mapping[str, bytes], *, overwrite: bool) -> None:
     Parameters
     ----------
     contents : mapping of str to bytes
-        What to write, by file; not to streams.
+        Contents by file name; streams are not allowed.
     overwrite : bool
-        Whether files that exist may be replaced.
+        Whether existing files may be replaced.
 
     Raises
     ------
@@ -160,19 +160,19 @@ def write_together(contents: Mapping[str, bytes], *, overwrite: bool) -> None:
 
 
 def temporary_beside(target: Path, suffix: str) -> Path:
-    """Name a temporary file in the folder of `target`, hidden, with the machine and the process in its name."""
+    """Return a hidden temporary name in the folder of `target`, with the machine and the process in it."""
     return target.with_name(f".cylx-{_machine()}-{os.getpid()}-{secrets.token_hex(8)}{suffix}")
 
 
 def remove_leftovers(folder: str | Path, process: int | None = None) -> None:
-    """Remove the temporary files that a process of this machine has left in a folder.
+    """Remove the temporary files left in a folder by a process of this machine.
 
     Parameters
     ----------
     folder : str or Path
-        What cannot be removed from it stays there.
+        Files in it that cannot be removed are kept.
     process : int, optional
-        The id of a process that has ended; by default all that have ended.
+        The id of a process that has ended; by default all processes that have ended.
     """
     with contextlib.suppress(OSError):
         for path in Path(folder).iterdir():
@@ -191,7 +191,7 @@ def _machine() -> str:
 
 
 def _has_ended(process: int) -> bool:
-    """Say whether a process is certainly gone; Windows has no way to ask that is not deadly."""
+    """Return whether a process has certainly ended; on Windows there is no safe way to ask."""
     if os.name == "nt":
         return False
     try:
@@ -219,7 +219,7 @@ def _target(path: str | Path) -> Path:
 
 
 def _mode(path: str | Path) -> int | None:
-    """Give the type and permissions of what the path leads to, None if there is nothing yet."""
+    """Return the type and permissions of the file at a path, None if there is no file."""
     try:
         return Path(path).stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

@@ -1,4 +1,4 @@
-"""What is packed by gzip is unpacked into an unnamed file, as long as it does not grow beyond measure."""
+"""Unpack gzip into an unnamed file, up to a maximum size."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 MOST_EXPANSION = 100
-"""What is packed may be so many times as large once it is unpacked …"""
+"""Largest allowed ratio of unpacked to packed size …"""
 ALWAYS_ALLOWED = 1 << 24
-"""… and so many bytes in any case."""
+"""… and a number of bytes that is always allowed."""
 _GZIP = b"\x1f\x8b"
 _BLOCK = 1 << 20
 _REMEDY = "get a complete copy of the file"
@@ -25,7 +25,7 @@ _REMEDY = "get a complete copy of the file"
 
 @contextmanager
 def unpacked(source: Input, *, packed: bool) -> Iterator[Input]:
-    """Give what a gzip file holds, with the digest of the file as it lies; any other file as it is.
+    """Yield the unpacked content of a gzip file, with the digest of the packed file; yield any other file unchanged.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def unpacked(source: Input, *, packed: bool) -> Iterator[Input]:
     Raises
     ------
     InputError
-        If the file is damaged, or larger than `MOST_EXPANSION` times its size once it is unpacked.
+        If the file is damaged, or its content is larger than `MOST_EXPANSION` times its size.
     """
     if source.head(2) != _GZIP:
         if packed:
@@ -53,16 +53,16 @@ def unpacked(source: Input, *, packed: bool) -> Iterator[Input]:
 
 
 def copy_unpacked(stream: IO[bytes], copy: IO[bytes], source: Input) -> int:
-    """Copy what a packed input holds, block by block.
+    """Copy the content of a packed input, block by block.
 
     Parameters
     ----------
     stream : binary file
-        What unpacks.
+        The stream that unpacks.
     copy : binary file
-        Where it goes.
+        The target file.
     source : Input
-        What is packed.
+        The packed input.
 
     Returns
     -------
@@ -72,14 +72,14 @@ def copy_unpacked(stream: IO[bytes], copy: IO[bytes], source: Input) -> int:
     Raises
     ------
     InputError
-        If the input is damaged, or holds too much.
+        If the input is damaged, or its content is too large.
     """
     most = max(MOST_EXPANSION * source.size, ALWAYS_ALLOWED)
     size = 0
     while block := _next_block(stream, source.place):
         size += len(block)
         if size > most:
-            fault = f"is more than {MOST_EXPANSION} times as large once it is unpacked"
+            fault = f"is more than {MOST_EXPANSION} times as large when unpacked"
             raise InputError(source.place, fault, "unpack it yourself if you trust it")
         copy.write(block)
     copy.flush()
@@ -90,6 +90,6 @@ def _next_block(stream: IO[bytes], place: str) -> bytes:
     try:
         return stream.read(_BLOCK)
     except EOFError:
-        raise InputError(place, "the file ends within what is packed", _REMEDY) from None
+        raise InputError(place, "the file ends within the packed data", _REMEDY) from None
     except (gzip.BadGzipFile, zlib.error) as error:
-        raise InputError(place, f"what is packed is damaged: {error}", _REMEDY) from None
+        raise InputError(place, f"the packed data are damaged: {error}", _REMEDY) from None

@@ -1,7 +1,7 @@
 """PCD: all fields of all points, in the order of the file.
 
-The header and the bodies `ascii` and `binary` are read here and not by open3d, which takes words for zeros, makes up
-the points that a short body lacks, and loses fields that it has no use for. open3d unpacks `binary_compressed`.
+The header and the bodies `ascii` and `binary` are read here and not by open3d, which reads words as zeros, invents
+points that a short body lacks, and drops fields that it does not use. open3d unpacks `binary_compressed`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _SUFFIX_REMEDY = "give it its right suffix"
 
 @dataclass(frozen=True, slots=True)
 class _Field:
-    """A field of a point: `count` values of a type, the first of them at byte `offset`."""
+    """A field of a point: `count` values of one type, starting at byte `offset`."""
 
     name: str
     type: str
@@ -51,13 +51,13 @@ class _Field:
         return self.name == "_"
 
     def names(self) -> list[str]:
-        """Name the values."""
+        """Return the names of the values."""
         return [self.name] if self.count == 1 else [f"{self.name}_{place}" for place in range(self.count)]
 
 
 @dataclass(frozen=True, slots=True)
 class _Header:
-    """What a header says, and where it ends, in bytes and lines."""
+    """The contents of a header, and where it ends, in bytes and lines."""
 
     fields: list[_Field]
     points: int
@@ -67,11 +67,11 @@ class _Header:
 
     @property
     def width(self) -> int:
-        """Bytes a point."""
+        """Bytes per point."""
         return sum(field.width for field in self.fields)
 
     def columns(self) -> list[tuple[str, str, _Field, int]]:
-        """Give the name, type and field of each value of a point, and its place in the field, padding left out."""
+        """Return the name, type and field of each value of a point, and its index in the field, without padding."""
         kept = [
             (name, field, place)
             for field in self.fields
@@ -83,7 +83,7 @@ class _Header:
 
 
 def read_pcd(source: Input) -> NDArray[np.void]:
-    """Read all points of a PCD file, the NaN points of organised clouds as well.
+    """Read all points of a PCD file, including the NaN points of organised clouds.
 
     Parameters
     ----------
@@ -92,13 +92,14 @@ def read_pcd(source: Input) -> NDArray[np.void]:
     Returns
     -------
     ndarray of shape (points,), structured
-        All fields but padding (`_`), a field `f` of several values as `f_0`, `f_1` and so on, those of `DATA binary`
-        mapped from the file. Coordinates in ascii are float64 whatever the header says: the text may hold more digits.
+        All fields but padding (`_`), a field `f` of several values as `f_0`, `f_1` and so on; those of `DATA binary`
+        are mapped from the file. Coordinates in ascii are always float64, as the text may hold more digits than the
+        type.
 
     Raises
     ------
     InputError
-        If this is no PCD, has no x, y and z, or is shorter than its header says, or damaged.
+        If this is not PCD, has no x, y and z, is shorter than its header says, or is damaged.
     """
     header = _read_header(source)
     if header.body == "ascii":
@@ -153,7 +154,7 @@ def _read_mapped(header: _Header, source: Input) -> NDArray[np.void]:
 
 
 def _read_text(header: _Header, source: Input) -> NDArray[np.void]:
-    """Read rows of text; padding is read like any other value, and left."""
+    """Read rows of text; padding is read like any other value, and dropped."""
     kept = [(name, kind) for name, kind, _, _ in header.columns()]
     exact = coordinate_names([name for name, _ in kept])
     wanted = iter([(name, "f8" if kind == "<f4" and name in exact else kind) for name, kind in kept])
@@ -207,8 +208,8 @@ def _read_header(source: Input) -> _Header:
         key = "FIELDS" if words[0] == "COLUMNS" else words[0]
         if key not in _KEYS:
             if not said:
-                raise InputError(source.place, "is no PCD: it does not begin with its header", _SUFFIX_REMEDY)
-            fault = f"{excerpt(' '.join(words))} is no line of a PCD header"
+                raise InputError(source.place, "is not PCD: it does not begin with its header", _SUFFIX_REMEDY)
+            fault = f"{excerpt(' '.join(words))} is not a line of a PCD header"
             raise InputError(f"{source.place}:{number}", fault, _REMEDY)
         said[key] = words[1:]
     body = " ".join(said["DATA"])
@@ -221,7 +222,7 @@ def _read_header(source: Input) -> _Header:
 
 def _unfinished(source: Input, said: dict[str, list[str]]) -> InputError:
     if not said:
-        return InputError(source.place, "is no PCD: it does not begin with its header", _SUFFIX_REMEDY)
+        return InputError(source.place, "is not PCD: it does not begin with its header", _SUFFIX_REMEDY)
     if source.size > _MOST_HEADER:
         return InputError(source.place, "the PCD header has no end", _REMEDY)
     return InputError(source.place, "the file ends within the PCD header", "get a complete copy of the file")
@@ -239,7 +240,7 @@ def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
         if len(values) != len(names):
             raise InputError(place, f"{len(names)} FIELDS, but {key} has {len(values)}", _REMEDY)
     if sum(counts) > _MOST_COLUMNS:
-        raise InputError(place, f"expected at most {_MOST_COLUMNS} values a point, found {sum(counts)}", _REMEDY)
+        raise InputError(place, f"expected at most {_MOST_COLUMNS} values per point, found {sum(counts)}", _REMEDY)
     fields: list[_Field] = []
     offset = 0
     for name, kind, size, count in zip(names, kinds, sizes, counts, strict=True):
@@ -248,7 +249,7 @@ def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
                 place, f"field {excerpt(name)} has the unknown type {excerpt(kind)} of size {size}", _REMEDY
             )
         if name in coordinate_names(names) and count != 1:
-            raise InputError(place, f"field {name} has {count} values", "give a PCD with one x, y and z a point")
+            raise InputError(place, f"field {name} has {count} values", "give a PCD with one x, y and z per point")
         fields.append(_Field(name, _TYPES[kind.upper(), size], count, offset))
         offset += fields[-1].width
     return fields

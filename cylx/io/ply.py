@@ -1,4 +1,4 @@
-"""PLY: the vertices with all their properties, by plyfile; rows of text, which it reads one by one, by numpy."""
+"""PLY: read the vertices with all their properties by plyfile, and rows of text by numpy, which is faster."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROWS_AT_A_TIME = 1 << 16  # rows written at a time
 
 
 def read_ply(source: Input) -> NDArray[np.void]:
-    """Read the vertices of a PLY file; the elements after them are not looked at.
+    """Read the vertices of a PLY file; later elements are ignored.
 
     Parameters
     ----------
@@ -34,13 +34,13 @@ def read_ply(source: Input) -> NDArray[np.void]:
     Returns
     -------
     ndarray of shape (vertices,), structured
-        All properties, those of a binary file mapped from it. Coordinates in ascii are float64 whatever the header
-        says: the text may hold more digits. List properties are columns of objects.
+        All properties, mapped from the file if it is binary. Coordinates in ascii are always float64, as the text may
+        hold more digits than the type. List properties are columns of objects.
 
     Raises
     ------
     InputError
-        If this is no PLY, has no vertices with scalar x, y and z, or is shorter than its header says.
+        If this is not PLY, has no vertices with scalar x, y and z, or is shorter than its header says.
     """
     header = read_header(source)
     if header.text and not header.vertex.has_lists:
@@ -55,7 +55,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
     ----------
     file : binary file
     dtype : dtype
-        Structured; types that PLY does not have are not among its fields.
+        Structured, with types that PLY has.
     count : int
         Number of vertices.
     blocks : iterable of ndarray, structured
@@ -79,7 +79,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
 
 
 def ply_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
-    """Give the type, little endian, that PLY has for a number type; integers of 8 bytes become double."""
+    """Return the little-endian type that PLY has for a number type; integers of 8 bytes become double."""
     return np.dtype("<f8") if dtype.kind in "iu" and dtype.itemsize > 4 else dtype.newbyteorder("<")
 
 
@@ -103,7 +103,7 @@ def _read_with_plyfile(header: Header, source: Input) -> NDArray[np.void]:
     stream = _Spliced("\n".join([*lines, "end_header\n"]).encode(), source)
     try:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
-            warnings.simplefilter("ignore")  # of an empty list
+            warnings.simplefilter("ignore")  # about an empty list
             warnings.simplefilter("error", DeprecationWarning)  # numpy 1 reads 300 as the uchar 44
             return np.asarray(PlyData.read(stream)["vertex"].data)
     except (PlyParseError, ValueError, OverflowError, DeprecationWarning) as error:
@@ -111,9 +111,9 @@ def _read_with_plyfile(header: Header, source: Input) -> NDArray[np.void]:
 
 
 class _Spliced:
-    """A clean header in front of the body of a file: without comments, and without the elements nobody needs.
+    """A clean header in front of the body of a file: without comments, and without unused elements.
 
-    Once the header is read, positions are those of the file, so that plyfile can map the body into memory.
+    After the header, positions are those of the file, so that plyfile can map the body into memory.
     """
 
     def __init__(self, header: bytes, source: Input) -> None:
@@ -121,7 +121,7 @@ class _Spliced:
         self.source = source
 
     def read(self, size: int = -1) -> bytes:
-        """Read, and never ask for more than there is: a broken list may claim to have billions of items."""
+        """Read at most the rest of the file: a broken list may claim to have billions of items."""
         left = self.source.size - self.source.file.tell()
         return self.header.read(size) or self.source.file.read(left if size < 0 else min(size, left))
 

@@ -1,4 +1,4 @@
-"""The header of a PLY file, checked against itself and against the size of the file."""
+"""The header of a PLY file, checked for consistency and against the size of the file."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _REMEDY = "export the file again as PLY 1.0"
 
 @dataclass(frozen=True, slots=True)
 class Property:
-    """A property of an element, types as PLY calls them; `length` is the type of its list's length, "" for a scalar."""
+    """A property of an element, with type names of PLY; `length` is the type of a list's length, "" for a scalar."""
 
     name: str
     type: str
@@ -61,13 +61,13 @@ class Element:
         return any(item.length for item in self.properties)
 
     def least_size(self, text: bool) -> int:
-        """Give the bytes that a row takes at least: of a list its length, in text a digit and what ends it."""
+        """Return the least bytes of a row: the length of a list; in text, one digit and a separator per property."""
         if text:
             return max(2 * len(self.properties), 1)
         return sum(np.dtype(TYPES[item.length or item.type]).itemsize for item in self.properties)
 
     def lines(self) -> list[str]:
-        """Write the element's part of a header."""
+        """Return the lines of the element in a header."""
         names = mended_names([item.name for item in self.properties])
         types = [f"list {item.length} {item.type}" if item.length else item.type for item in self.properties]
         return [
@@ -78,7 +78,7 @@ class Element:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What a header says: format, elements up to the vertices, and where it ends, in bytes and lines."""
+    """The contents of a header: format, elements up to the vertices, and where it ends, in bytes and lines."""
 
     format: str
     elements: list[Element]
@@ -92,7 +92,7 @@ class Header:
 
     @property
     def vertex(self) -> Element:
-        """The points."""
+        """The vertex element."""
         return self.elements[-1]
 
 
@@ -102,7 +102,7 @@ def read_header(source: Input) -> Header:
     Raises
     ------
     InputError
-        If this is no PLY, has no vertices with scalar x, y and z, or is shorter than its header says.
+        If this is not PLY, has no vertices with scalar x, y and z, or is shorter than its header says.
     """
     header = _read_lines(source)
     _check_vertex(header.vertex, source.place)
@@ -128,7 +128,7 @@ def _read_lines(source: Input) -> Header:
         elif keyword == "property" and elements:
             elements[-1].properties.append(_property(rest, where))
         else:
-            raise InputError(where, f"{excerpt(line)} is no line of a PLY header", _REMEDY)
+            raise InputError(where, f"{excerpt(line)} is not a line of a PLY header", _REMEDY)
     if not kind:
         raise InputError(source.place, "the PLY header has no format line", _REMEDY)
     names = [element.name for element in elements]
@@ -138,10 +138,10 @@ def _read_lines(source: Input) -> Header:
 
 
 def _header_lines(source: Input) -> Iterator[tuple[int, int, str]]:
-    """Give number, end and text of each line of the header, which may end in LF, CR LF or CR."""
+    """Yield number, end and text of each line of the header, which may end in LF, CR LF or CR."""
     head = source.head(_MOST_HEADER)
     if head[:3] != b"ply" or head[3:4] not in (b"\n", b"\r", b""):
-        raise InputError(source.place, "is no PLY: it does not begin with the line 'ply'", "give it its right suffix")
+        raise InputError(source.place, "is not PLY: it does not begin with the line 'ply'", "give it its right suffix")
     newline = b"\r" if head[3:4] == b"\r" and head[4:5] != b"\n" else b"\n"
     start = number = 0
     while (stop := head.find(newline, start)) >= 0:
@@ -163,7 +163,7 @@ def _format(words: list[str], where: str) -> str:
 
 def _element(words: list[str], where: str) -> Element:
     if len(words) != 2:
-        raise InputError(where, f"{excerpt(' '.join(words))} is no name and count of an element", _REMEDY)
+        raise InputError(where, f"{excerpt(' '.join(words))} is not the name and count of an element", _REMEDY)
     if not (words[1].isascii() and words[1].isdecimal() and len(words[1]) < 19):
         raise InputError(where, f"element {excerpt(words[0])} has the impossible count {excerpt(words[1])}", _REMEDY)
     return Element(words[0], int(words[1]), [])
@@ -174,7 +174,7 @@ def _property(words: list[str], where: str) -> Property:
         return Property(words[1], words[0])
     if len(words) == 4 and words[0] == "list" and words[1] in TYPES and words[2] in TYPES:
         return Property(words[3], words[2], words[1])
-    raise InputError(where, f"{excerpt(' '.join(words))} is no type and name of a property", _REMEDY)
+    raise InputError(where, f"{excerpt(' '.join(words))} is not a property type and name", _REMEDY)
 
 
 def _check_vertex(vertex: Element, place: str) -> None:
@@ -187,14 +187,14 @@ def _check_vertex(vertex: Element, place: str) -> None:
         raise InputError(place, f"the vertex element has the property {excerpt(twice)} twice", _REMEDY)
     for item in vertex.properties:
         if item.length and item.name in coordinate_names(names):
-            raise InputError(place, f"the property {item.name} is a list", "give a PLY with one x, y and z a point")
+            raise InputError(place, f"the property {item.name} is a list", "give a PLY with one x, y and z per point")
     if vertex.count == 0:
         raise InputError(place, "holds no points", "give a file with points")
 
 
 def _check_size(header: Header, source: Input) -> None:
-    """Refuse counts that could not fit into the file, before anything is allocated for them."""
-    room = source.size - header.size + header.text  # the last line may lack its end
+    """Refuse counts that do not fit into the file, before memory is allocated for them."""
+    room = source.size - header.size + header.text  # the last line end may be missing
     for element in header.elements[:-1]:
         if not element.properties:
             raise InputError(source.place, f"the element {excerpt(element.name)} has no properties", _REMEDY)
@@ -203,7 +203,7 @@ def _check_size(header: Header, source: Input) -> None:
             fault = f"the header promises {element.count} elements {excerpt(element.name)}, the file is too short"
             raise InputError(source.place, fault, "get a complete copy of the file")
     if header.text and not header.vertex.has_lists:
-        return  # these rows are counted as they are read
+        return  # these rows are counted while they are read
     held = room // header.vertex.least_size(header.text)
     if held < header.vertex.count:
         raise short_of_points(source.place, header.vertex.count, held, at_most=header.text)

@@ -1,4 +1,4 @@
-"""Rows of numbers in text, as XYZ files, ascii PLY and ascii PCD hold them."""
+"""Rows of numbers in text, as in XYZ files, ascii PLY and ascii PCD."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ COMMENTS = ("#", "//")
 
 @dataclass(frozen=True, slots=True)
 class RowFormat:
-    """How the rows are written, and where they are.
+    """The format and position of the rows.
 
     Parameters
     ----------
     dtype : dtype
-        Structured: one scalar field a column.
+        Structured: one scalar field per column.
     offset : int
         Byte at which the text begins.
     line : int
@@ -37,9 +37,9 @@ class RowFormat:
     skip : int
         Lines to skip from there.
     count : int or None
-        Rows to read; None for all there are.
+        Number of rows to read; None for all.
     delimiter : str or None
-        What stands between columns; None for white space.
+        Separator of the columns; None for white space.
     commented : bool
         Whether `#` and `//` begin a comment.
     """
@@ -68,7 +68,7 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
     Raises
     ------
     InputError
-        If a row has too few or too many columns, or something that is no number of the column's type; or if there are
+        If a row has too few or too many columns, or a value that is not a number of the column's type, or if there are
         fewer rows than `rows.count`.
     """
     most = _most_rows(source, rows)
@@ -76,7 +76,7 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
         with text_lines(source, rows.offset) as lines:
             table = _load(lines, rows, rows.delimiter, most)
     except (ValueError, DeprecationWarning):
-        # What is wrong, and in which line, takes a slower look; if nothing is, the rows come with it.
+        # The fast reader failed. The slower one finds the line that is wrong; if none is, it returns the rows.
         with text_lines(source, rows.offset) as lines:
             table = _load(_checked(lines, rows, source.place), rows, None, most)
     if rows.count is not None and len(table) < rows.count:
@@ -85,7 +85,7 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
 
 
 def short_of_points(place: str, promised: int, found: int, *, at_most: bool = False) -> InputError:
-    """Make the error of a file whose body is shorter than its header says."""
+    """Return the error for a file whose body is shorter than its header says."""
     held = f"at most {found}" if at_most else f"{found}"
     return InputError(
         place, f"the header promises {promised} points, the file holds {held}", "get a complete copy of the file"
@@ -94,7 +94,7 @@ def short_of_points(place: str, promised: int, found: int, *, at_most: bool = Fa
 
 @contextmanager
 def text_lines(source: Input, offset: int = 0) -> Iterator[io.TextIOWrapper]:
-    """Give the lines of a text from a byte on, with any line ends; bytes that are not UTF-8 come spelled out."""
+    """Yield the lines of a text from a byte on, with any line ends; bytes that are not UTF-8 are escaped."""
     source.file.seek(offset)
     lines = io.TextIOWrapper(source.file, encoding="utf-8-sig", errors="backslashreplace")
     try:
@@ -104,7 +104,7 @@ def text_lines(source: Input, offset: int = 0) -> Iterator[io.TextIOWrapper]:
 
 
 def uncommented(line: str) -> str:
-    """Cut a comment off a line, and the white space about the rest.
+    """Remove a comment from a line, and white space from both ends.
 
     Examples
     --------
@@ -117,7 +117,7 @@ def uncommented(line: str) -> str:
 
 
 def split_row(line: str, delimiter: str | None) -> list[str]:
-    """Split a row into its columns; a delimiter at the end of the row is none.
+    """Split a row into its columns; a delimiter at the end adds no column.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def split_row(line: str, delimiter: str | None) -> list[str]:
 
 
 def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
-    """Tell whether a column can be read as a number, and held by a type.
+    """Return whether a text is a number that fits a type.
 
     Examples
     --------
@@ -152,7 +152,7 @@ def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
 
 def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: int | None) -> NDArray[np.void]:
     with warnings.catch_warnings(), np.errstate(all="ignore"):
-        warnings.simplefilter("ignore")  # of empty lines and of an empty file, which is dealt with here
+        warnings.simplefilter("ignore")  # about empty lines and an empty file, which are handled here
         warnings.simplefilter("error", DeprecationWarning)  # numpy 1 reads 300 as the uchar 44
         return np.loadtxt(
             lines,
@@ -166,7 +166,7 @@ def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: in
 
 
 def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]:
-    """Give the lines with one space between columns, until one of them is wrong."""
+    """Yield the lines with one space between columns, up to the first wrong line, which raises."""
     names = rows.dtype.names or ()
     yield from ("\n" for _ in range(rows.skip))
     for number, line in enumerate(islice(lines, rows.skip, None), rows.line + rows.skip):
@@ -187,7 +187,7 @@ def check_number(where: str, name: str, column: str, dtype: np.dtype[Any] | None
     Raises
     ------
     InputError
-        If it is not.
+        If it is not a number.
     """
     if not is_number(column, dtype):
         kind = "a number" if dtype is None or dtype.kind == "f" else f"a number of type {dtype.name}"
@@ -196,6 +196,6 @@ def check_number(where: str, name: str, column: str, dtype: np.dtype[Any] | None
 
 
 def _most_rows(source: Input, rows: RowFormat) -> int | None:
-    """Give the count of rows, for which memory is taken at once, unless the file has no room: two bytes a column."""
+    """Return the number of rows to allocate, or None if the file is too small for it: two bytes per column."""
     room = (source.size - rows.offset + 1) // (2 * len(rows.dtype.names or ()))
     return rows.count if rows.count is not None and rows.count <= room else None

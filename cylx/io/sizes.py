@@ -1,4 +1,4 @@
-"""How many points a file holds, as far as that can be told without reading it."""
+"""Estimate the number of points in a file without reading all of it."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ _PROMISES = {
     b"VERSION": re.compile(rb"[\r\n]POINTS[ \t]+(\d{1,18})\b"),
 }
 _BYTES_A_POINT = 8
-"""Of a binary file without a header that we know."""
+"""Bytes per point in a binary file without a known header."""
 
 
 def expected_points(path: str | Path) -> int:
-    """Estimate the number of points in a file: what its header promises, or else what its size allows.
+    """Estimate the number of points in a file from its header, or else from its size.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def expected_points(path: str | Path) -> int:
     Returns
     -------
     int
-        0 if there is no such file, or no telling.
+        0 if there is no such file, or no estimate.
     """
     try:
         if not Path(path).is_file():  # a pipe can be read only once
@@ -44,7 +44,7 @@ def expected_points(path: str | Path) -> int:
 
 
 def _promised(head: bytes) -> int | None:
-    """Give the number in a header, None if there is none."""
+    """Return the number of points in a header, None if there is none."""
     if head.startswith(b"LASF") and len(head) >= 255:
         long = int.from_bytes(head[247:255], "little") if head[25] >= 4 else 0
         return long or int.from_bytes(head[107:111], "little")

@@ -33,10 +33,10 @@ _MOST_COLUMNS = 1000
 
 
 def read_xyz(source: Input) -> NDArray[np.void]:
-    """Read rows of x, y, z and whatever else they hold, as float64.
+    """Read rows of x, y, z and further columns, as float64.
 
-    Comments begin with `#` or `//`. A line of names, as such or as the last comment before the data, names the columns;
-    a number alone in the first line, as in .pts files, is the count of the rows.
+    Comments begin with `#` or `//`. A line of names, or the last comment before the data, names the columns. A single
+    number in the first line, as in .pts files, is the number of rows.
 
     Parameters
     ----------
@@ -45,12 +45,12 @@ def read_xyz(source: Input) -> NDArray[np.void]:
     Returns
     -------
     ndarray of shape (rows,), structured
-        `x`, `y`, `z`, and the other columns by their name, or as `column_4` and so on.
+        `x`, `y`, `z`, and the other columns by name, or as `column_4` and so on.
 
     Raises
     ------
     InputError
-        If this is not text, or a row is not made of numbers, or not of as many as the first row, or of less than three.
+        If this is not text, or a row has non-numbers, fewer than three columns, or not as many as the first row.
     """
     _check_text(source)
     with text_lines(source) as lines:
@@ -64,13 +64,13 @@ def read_xyz(source: Input) -> NDArray[np.void]:
 
 
 def write_xyz(file: BinaryIO, suffix: str, table: NDArray[np.void]) -> None:
-    """Write rows of numbers, with no more digits than tell them apart.
+    """Write rows of numbers, with the fewest digits that preserve the values.
 
     Parameters
     ----------
     file : binary file
     suffix : str
-        `.csv` has commas and a line of names, `.pts` a count of the rows.
+        `.csv` adds commas and a line of names, `.pts` the number of rows.
     table : ndarray of shape (rows,), structured
     """
     names = list(table.dtype.names or ())
@@ -89,20 +89,20 @@ def write_xyz(file: BinaryIO, suffix: str, table: NDArray[np.void]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _Top:
-    """What the lines up to the first row say.
+    """The contents of the lines up to the first row.
 
     Parameters
     ----------
     lines : int
-        How many they are, the first row not among them.
+        Number of lines before the first row.
     columns : int
-        Columns of the first row.
+        Number of columns of the first row.
     delimiter : str or None
-        What stands between them; None for white space.
+        Separator of the columns; None for white space.
     remark : str
         The line that may hold names.
     count : int or None
-        The number of rows promised.
+        The number of rows promised by the first line.
     """
 
     lines: int
@@ -112,7 +112,7 @@ class _Top:
     count: int | None
 
     def names(self) -> list[str]:
-        """Name the columns."""
+        """Return the names of the columns."""
         said = [name.strip("\"' ") for name in split_row(self.remark, self.delimiter)]
         if len(said) != self.columns:
             said = _words(self.remark)
@@ -131,7 +131,7 @@ def _named_by_place(names: Sequence[str], columns: int) -> list[str]:
 
 
 def _with_coordinates_first(names: list[str]) -> list[str]:
-    """Mend the names; if one of them is needed twice, the coordinates keep theirs."""
+    """Replace invalid names; if a name is needed twice, the coordinate keeps it."""
     order = sorted(range(len(names)), key=lambda place: names[place] not in ("x", "y", "z"))
     mended = dict(zip(order, mended_names([names[place] for place in order]), strict=True))
     return [mended[place] for place in range(len(names))]
@@ -166,7 +166,7 @@ def _check_first_row(where: str, columns: Sequence[str]) -> None:
 
 
 def _named_in_comment(line: str) -> str:
-    """Give the text of a comment that names x, y and z, or nothing."""
+    """Return the text of a comment that names x, y and z, or an empty text."""
     text = line.strip().lstrip("".join(COMMENTS)).strip()
     return text if len(coordinate_names(_words(text))) == 3 else ""
 

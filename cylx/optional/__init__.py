@@ -1,1 +1,1 @@
-"""Libraries that may be missing, asked for in one way."""
+"""Optional libraries, and the errors if they are missing."""

@@ -1,4 +1,4 @@
-"""Libraries that are installed only by those who need them: which extra brings each, and what to say without it."""
+"""Libraries that only some users need: the extra that installs each, and the error if it is missing."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ LIBRARIES = {
     "ezdxf": Library("dxf", "export of DXF"),
     "pandas": Library("dataframe", "data frames"),
 }
-"""By the names that they are imported by."""
+"""Optional libraries by import name."""
 
 
 def require(*libraries: str, place: str, needed_by: str | None = None, error: type[CylxError] = UsageError) -> None:
-    """Refuse what needs libraries that are not there, and name the command that installs them.
+    """Refuse what needs libraries that are not installed, and name the command that installs them.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Figures of matplotlib, which is an extra: made without a display and without the state of pyplot."""
+"""Figures of matplotlib, which is an extra; made without a display and without the state of pyplot."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def check_pictures() -> None:
-    """Refuse to draw where the drawing library is missing, before anything is computed.
+    """Check that matplotlib is installed, before anything is computed.
 
     Raises
     ------
@@ -30,9 +30,9 @@ def new_figure(inches: tuple[float, float], dpi: int, *, layout: Literal["constr
     inches : pair of float
         Width and height.
     dpi : int
-        Pixels an inch.
+        Pixels per inch.
     layout : {'constrained'}, optional
-        How its parts find their places; as they say by default.
+        Layout engine; by default the parts of the figure set their own positions.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def new_figure(inches: tuple[float, float], dpi: int, *, layout: Literal["constr
     from matplotlib.figure import Figure  # noqa: PLC0415  an extra
 
     class ShownFigure(Figure):  # type: ignore[misc, unused-ignore]  # without matplotlib it has no types
-        """A figure that a notebook shows though pyplot does not know it."""
+        """A figure that a notebook shows although pyplot does not know it."""
 
         def _repr_png_(self) -> bytes:
             picture = io.BytesIO()

@@ -1,4 +1,4 @@
-"""The only place that imports open3d."""
+"""The only module that imports open3d."""
 
 from __future__ import annotations
 
@@ -32,13 +32,13 @@ DATA binary_compressed
 
 
 class NoDisplayError(Exception):
-    """There is nothing to open a window on."""
+    """There is no display for a window."""
 
 
 def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
-    """Import open3d, on a fresh Linux machine too.
+    """Import open3d, even if Linux lacks libusb.
 
-    There the library libusb, which open3d is linked with, is missing; the copy in `libusb_package` takes its place.
+    open3d is linked with libusb, which a fresh Linux machine lacks; the copy in `libusb_package` is loaded instead.
 
     Raises
     ------
@@ -58,18 +58,18 @@ def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
 def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | None:
     """Unpack the body of a binary_compressed PCD: all values of the first field, then all of the second, and so on.
 
-    The header given to open3d makes a field of every byte. With the header of the file, open3d 0.20 drops the alpha of
-    rgba and all but the first value of fields with several, and writes past its arrays for normals in float64, for
+    The header given to open3d declares every byte as a field. With the header of the file, open3d 0.20 drops the alpha
+    of rgba and all but the first value of fields with several, and writes past its arrays for normals in float64, for
     padding and for repeated names.
 
     Parameters
     ----------
     body : bytes
-        What stands behind the header: two sizes, checked by the caller, and the packed values.
+        The bytes after the header: two sizes, checked by the caller, and the packed values.
     points : int
         Number of points.
     width : int
-        Bytes a point, at least 3.
+        Bytes per point, at least 3.
 
     Returns
     -------
@@ -103,7 +103,7 @@ def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | 
 
 
 def estimate_normals(points: NDArray[np.float64], neighbours: int) -> NDArray[np.float64]:
-    """Give the normal of the plane through the nearest neighbours of each point.
+    """Return the normal of the plane through the nearest neighbours of each point.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def estimate_normals(points: NDArray[np.float64], neighbours: int) -> NDArray[np
     Returns
     -------
     ndarray of shape (N, 3)
-        Unit vectors, either way.
+        Unit vectors, up to sign.
 
     Raises
     ------
@@ -146,7 +146,7 @@ def show_scene(
     tints : ndarray of shape (number of cylinders, 3), uint8
         Their colours.
     title : str
-        Of the window.
+        Title of the window.
 
     Raises
     ------
@@ -158,7 +158,7 @@ def show_scene(
     if not _has_display():
         raise NoDisplayError
     open3d = import_open3d()
-    middle = points.mean(axis=0) if len(points) else np.zeros(3)  # what is drawn is drawn in single precision
+    middle = points.mean(axis=0) if len(points) else np.zeros(3)  # open3d draws in single precision
     cloud = open3d.geometry.PointCloud(open3d.utility.Vector3dVector(points - middle))
     cloud.colors = open3d.utility.Vector3dVector(colors / 255.0)
     meshes = [
@@ -177,7 +177,7 @@ def show_scene(
 
 
 def _has_display() -> bool:
-    """Say whether a window would be seen; open3d opens one in memory, and waits for ever, where there is no display."""
+    """Return whether a window would be visible; without a display open3d opens one in memory and waits for ever."""
     if not sys.platform.startswith("linux") or os.environ.get("WAYLAND_DISPLAY"):
         return True
     if not os.environ.get("DISPLAY"):

@@ -1,7 +1,7 @@
-"""What travels between the stages: shapes with their evidence, and the counts of what was dropped on the way.
+"""The data passed between the stages: shapes with their evidence, and counts of rejections.
 
-Many things of one kind travel as a structure of arrays (`Candidates`); the few cylinders that come out travel one by
-one. All records are frozen: a stage makes new ones and never changes those it was given.
+Large numbers of one kind are a structure of arrays (`Candidates`); the few resulting cylinders are single objects. All
+records are frozen: a stage makes new ones and never changes its inputs.
 """
 
 from __future__ import annotations

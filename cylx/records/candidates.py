@@ -1,4 +1,4 @@
-"""What may be a cylinder: slices, ellipses, candidates, clusters of them."""
+"""Records before the fit: slices, ellipses, candidates, and clusters of candidates."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cylx.geometry.plane import Plane
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Slice:
-    """The points close to a plane, in its coordinates.
+    """The points close to a plane, in the coordinates of the plane.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ class EllipseFit:
     ellipse : Ellipse
         In the coordinates of the plane.
     plane : Plane
-        Where it lies.
+        The plane it lies in.
     inliers : int
         Points that support it.
     """
@@ -53,12 +53,12 @@ class Candidates:
     Parameters
     ----------
     models : ndarray of shape (M, 7)
-        Point of the axis, unit direction, radius. The point is the place the candidate speaks for: the ellipse's
-        centre, or the axis point nearest to its window.
+        Point of the axis, unit direction, radius. The point is the location of the candidate: the ellipse's centre, or
+        the axis point nearest to its window.
     parents : ndarray of shape (M,)
         Slice or window it comes from; candidates of one parent exclude each other (eq. 5).
     extents : ndarray of shape (M,)
-        Length of the axis that its own points cover; 0 where not known.
+        Length of the axis that its own points cover; 0 if unknown.
     inliers : ndarray of shape (M,)
         Points that support it.
     windows : ndarray of shape (M,)
@@ -90,20 +90,20 @@ class Candidates:
         return self.models[:, RADIUS]
 
     def take(self, which: IndexArray | MaskArray) -> Candidates:
-        """Give the candidates at these indices, or under this mask."""
+        """Return the candidates at these indices, or under this mask."""
         return Candidates(
             self.models[which], self.parents[which], self.extents[which], self.inliers[which], self.windows[which]
         )
 
     @classmethod
     def of_windows(cls, rows: FloatArray, radius: float) -> Candidates:
-        """Make candidates of windows of one radius, each a parent of its own: rows (M, 9) of model, inliers, extent."""
+        """Make candidates of windows of one radius, each its own parent: rows (M, 9) of model, inliers, extent."""
         inliers = rows[:, 7].astype(np.int64)
         return cls(rows[:, :7].copy(), np.arange(len(rows)), rows[:, 8].copy(), inliers, np.full(len(rows), radius))
 
     @classmethod
     def joined(cls, parts: Sequence[Candidates]) -> Candidates:
-        """Put several sets behind one another; parents are renumbered so that they stay apart."""
+        """Concatenate several sets; parents are renumbered so that they stay distinct."""
         if not parts:
             return cls(np.empty((0, 7)), np.empty(0, np.int64), np.empty(0), np.empty(0, np.int64), np.empty(0))
         shifts = np.cumsum([0] + [int(part.parents.max(initial=-1)) + 1 for part in parts])

@@ -1,4 +1,4 @@
-"""What is a cylinder: segments, findings, and the answer."""
+"""Records of cylinders: segments, findings, refusals, and the extraction."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
-    """A piece of a cylinder in the frame of the cloud, before it is judged.
+    """A piece of a cylinder in the frame of the cloud, before verification.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Segment:
 
     @property
     def cylinder(self) -> Cylinder:
-        """The shape, in the frame."""
+        """The shape, in the frame of the cloud."""
         return Cylinder(self.point, self.direction, self.radius, 2.0 * self.half)
 
 
@@ -87,7 +87,7 @@ class Finding:
     offset_error, tilt_error : float
         Standard deviations of the axis, at its middle and in angle.
     measures : mapping of str to float
-        What the verification measured.
+        The measures of the verification.
     """
 
     segment: Segment
@@ -103,24 +103,24 @@ class Finding:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RejectedSegment:
-    """A segment that was not accepted, in the frame of the cloud.
+    """A segment that was rejected, in the frame of the cloud.
 
     Parameters
     ----------
     segment : Segment
-        Fitted, or the average of its candidates if it did not come to a fit.
+        The fitted segment, or the average of its candidates if it was rejected before the fit.
     reason : str
-        The term of the evidence that speaks most against it, or the limit it does not keep.
+        The term of the evidence that speaks most against it, or the limit it exceeds.
     support : int
         Candidates of its cluster.
     payoff : float
         Mean payoff of its cluster; 0 if no game was played.
     confidence : float or None
-        Probability that it is a cylinder; None if it was refused before anything was measured.
+        Probability that it is a cylinder; None if it was rejected before measuring.
     coverage : float
         Angle about the axis that is covered, radians; 0 if it was not measured.
     measures : mapping of str to float
-        What the verification measured.
+        The measures of the verification.
     """
 
     segment: Segment
@@ -133,7 +133,7 @@ class RejectedSegment:
 
     @classmethod
     def of(cls, finding: Finding, reason: str) -> RejectedSegment:
-        """Take back a finding."""
+        """Turn a finding into a refusal."""
         confidence, coverage = finding.confidence, finding.coverage
         return cls(finding.segment, reason, finding.support, finding.payoff, confidence, coverage, finding.measures)
 
@@ -147,13 +147,13 @@ class NominalRadius:
     decision : {'snapped', 'ambiguous', 'none'}
         `snapped` if the cylinder was fitted again with it (see `cylx.fits.nominal_radius.Choice`).
     name : str or None
-        Of the entry, if it has one.
+        Name of the entry, if it has one.
     nominal_radius : float
-        Of the entry, scene units.
+        Nominal radius of the entry, scene units.
     likelihood_ratio : float
-        Of the entry to the stronger one of its two rivals: the second entry, and none at all; > 0.
+        Likelihood ratio of the entry to the stronger of its two rivals, the second entry and no entry; > 0.
     free_radius, free_radius_sd : float
-        The fit without the catalogue, with its standard deviation, scene units.
+        Radius of the fit without the catalogue, and its standard deviation, scene units.
     """
 
     decision: Decision
@@ -173,7 +173,7 @@ class CylinderFit:
     cylinder : Cylinder
         The shape in scene units; its point is the middle of the visible extent.
     inliers : int
-        Points of the cloud that carry its label.
+        Points of the cloud with its label.
     rmse : float
         Root mean square of the inliers' distances to the surface, scene units.
     coverage : float
@@ -185,12 +185,13 @@ class CylinderFit:
     confidence : float or None
         Probability that it is a cylinder; None if it was not verified.
     evidence : mapping of str to float
-        What the verification measured, by the name of the test.
+        The measures of the verification, by name.
     covariance : ndarray of shape (5, 5) or None
-        Of two offsets of the axis at its point, along the two directions of `cylx.geometry.cylinder.axis_basis`, of
-        two tilts of the axis towards them, and of the radius; scene units and radians. None if it was not computed.
+        Covariance of two offsets of the axis at its point, along the two directions of
+        `cylx.geometry.cylinder.axis_basis`, of two tilts of the axis towards them, and of the radius; scene units and
+        radians. None if it was not computed.
     nominal : NominalRadius or None
-        What the catalogue has for it; None without a catalogue or a covariance.
+        Its entry of the catalogue; None without a catalogue or a covariance.
     """
 
     cylinder: Cylinder
@@ -217,15 +218,15 @@ class CylinderFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RejectedFit:
-    """What was taken for a cylinder and not accepted.
+    """A possible cylinder that was rejected.
 
     Parameters
     ----------
     fit : CylinderFit
-        Its shape and the evidence. Its inliers are the points on its surface, whatever their label; what was refused
-        before it was measured has no confidence and no evidence.
+        Its shape and the evidence. Its inliers are the points on its surface, whatever their label. If it was rejected
+        before measuring, it has no confidence and no evidence.
     reason : str
-        The term of the evidence that speaks most against it, or the limit it does not keep.
+        The term of the evidence that speaks most against it, or the limit it exceeds.
     """
 
     fit: CylinderFit
@@ -234,7 +235,7 @@ class RejectedFit:
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Extraction:
-    """All that one run found out about one cloud.
+    """The full output of one run on one cloud.
 
     Parameters
     ----------
@@ -246,18 +247,18 @@ class Extraction:
         Signed distance of each labelled point to its cylinder's surface, scene units, + is outside; NaN without a
         label.
     cloud : PointCloud
-        What was looked at.
+        The input cloud.
     scene : Scene
-        What the cloud says about itself.
+        Scale and noise of the cloud.
     stages : tuple of StageReport
         Counts per stage, in order.
     config : Config
-        The resolved configuration: nothing in it is None that the run depended on.
+        The resolved configuration: nothing that the run used is None.
     warnings : tuple of str
-        What a user should know before trusting the answer.
+        What a user should know before trusting the result.
     rejected : tuple of RejectedFit
-        What was not accepted, ordered by confidence, then inliers, descending; what was not measured comes last. The
-        like of one refused segment may be in it more than once.
+        The rejected cylinders, ordered by confidence, then inliers, descending; those not measured come last. Near
+        copies of one rejected segment may occur more than once.
     """
 
     cylinders: tuple[CylinderFit, ...]
@@ -278,7 +279,7 @@ class Extraction:
         return html_in_notebook(self)
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
-        """Give the cylinders as arrays, in their order.
+        """Return the cylinders as arrays, in their order.
 
         Returns
         -------

@@ -1,4 +1,4 @@
-"""Who watches a run, and what each stage counts."""
+"""Progress observers, and the counts of each stage."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Protocol
 
 @dataclass(frozen=True, slots=True)
 class StageReport:
-    """What a stage looked at, what it kept, and why it dropped the rest.
+    """What came into a stage, what it kept, and why it rejected the rest.
 
     Parameters
     ----------
     name : str
         The stage.
     considered, kept : int
-        Things that came in, things that went on.
+        Number of inputs, number of outputs.
     rejected : mapping of str to int
-        Reason to count, no zero counts.
+        Count by reason, without zero counts.
     """
 
     name: str
@@ -28,20 +28,20 @@ class StageReport:
 
 
 class Observer(Protocol):
-    """Somebody who watches the pipeline: a progress display, a profile."""
+    """An observer of the pipeline, such as a progress display or a profile."""
 
     def stage_started(self, name: str, total: int | None) -> None:
-        """Begin a stage of `total` steps, None if their number is not known; it may come in several parts."""
+        """Begin a stage of `total` steps; None if the number is unknown. A stage may come in several parts."""
 
     def stage_advanced(self, steps: int) -> None:
-        """Count `steps` further steps of the present stage."""
+        """Count `steps` further steps of the current stage."""
 
     def stage_finished(self, name: str, seconds: float) -> None:
         """End a stage, or a part of it, that took `seconds`."""
 
 
 class SilentObserver:
-    """The observer nobody listens to."""
+    """An observer that does nothing."""
 
     def stage_started(self, name: str, total: int | None) -> None:
         """Ignore."""

@@ -1,4 +1,4 @@
-"""A cloud at one scale: thinned to the size of the windows that look at it."""
+"""A cloud at one scale: thinned to the size of the windows used there."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from cylx.geometry.morton import cell_starts, group, pick_one
 from cylx.records.clouds import Frame
 
 LEVELS_TO_BLOCK = 2
-"""Levels from a voxel to the block of voxels that tells how many points one should have."""
+"""Levels from a voxel to the block of voxels that shows how many points a voxel should have."""
 SLIVER = 8
-"""A voxel with so many times fewer points than the fullest one of its block is one that a surface hardly touches."""
+"""A surface hardly touches a voxel that has this many times fewer points than the fullest one of its block."""
 CELL = 4
-"""Levels from a voxel to the cells that windows gather points from: to look a cell up takes as long as many points."""
+"""Levels from a voxel to the cells that windows gather points from: a cell lookup costs as much as many points."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Scale:
-    """The points that windows of one radius see: one of each voxel, a sixth to a twelfth of the radius wide.
+    """The points for windows of one radius: one point per voxel; a voxel is a sixth to a twelfth of the radius wide.
 
     Parameters
     ----------
     radius : float
-        Of the windows, frame units.
+        Radius of the windows, frame units.
     level : int
         Level of the voxels.
     points : ndarray of shape (n, 3)
@@ -34,11 +34,11 @@ class Scale:
     codes : ndarray of shape (n,)
         Their Morton codes.
     indices : ndarray of shape (n,)
-        Which points of the frame they are.
+        Their indices in the frame.
     cells, starts, side
-        Cells of sixteen voxels' width for `gather_ball`.
+        Cells sixteen voxels wide, for `gather_ball`.
     members : ndarray of shape (m,)
-        The points of the frame that were thinned, ascending.
+        Indices of the points of the frame before thinning, ascending.
     runs : ndarray of shape (n + 1,)
         Members `runs[i]:runs[i + 1]` lie in the voxel of point i.
     """
@@ -56,7 +56,7 @@ class Scale:
 
     @classmethod
     def of(cls, frame: Frame, radius: float, keep: MaskArray) -> Scale:
-        """Thin the points to keep of a frame for windows of a radius."""
+        """Thin the kept points of a frame for windows of a radius."""
         level = frame.voxel_level + max(0, math.floor(math.log2(radius / frame.window)))
         members, voxels, runs = _without_slivers(*group(frame.codes, level, keep))
         indices = members[pick_one(voxels, runs)]
@@ -66,10 +66,10 @@ class Scale:
         return cls(radius, level, frame.points[indices], codes, indices, cells, starts, side, members, runs)
 
     def seeds(self, enough: int, keep: MaskArray | None = None, least: int = 1) -> IndexArray:
-        """Choose places for windows, evenly: indices of points, one of each cell of sixteen voxels' width.
+        """Choose evenly spread places for windows: indices of points, one in each cell sixteen voxels wide.
 
-        Of eight or of four where that makes fewer than `enough`; only points to `keep`, if given, and only where a cell
-        holds at least so many of them.
+        If that gives fewer than `enough`, the cells are eight or four voxels wide. Only points under `keep`, if given,
+        are chosen, and only in cells with at least `least` of them.
         """
         members = np.arange(len(self.codes)) if keep is None else np.flatnonzero(keep)
         for shift in (4, 3, 2):
@@ -85,14 +85,14 @@ class Scale:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Explained:
-    """What the points have been found to lie on, filled in as the windows become finer.
+    """What the points have been found to lie on; filled in from coarse to fine windows.
 
     Parameters
     ----------
     flatness : ndarray of shape (N,)
         Radius of the largest flat window that holds the point, 0 if there is none; frame units.
     curved : ndarray of shape (N,), bool
-        Whether a candidate of local curvature passes by the point.
+        Whether the point lies on a candidate of local curvature.
     """
 
     flatness: FloatArray
@@ -100,10 +100,10 @@ class Explained:
 
 
 def _without_slivers(members: IndexArray, voxels: IndexArray, runs: IndexArray) -> tuple[IndexArray, ...]:
-    """Leave out the voxels that a surface hardly touches.
+    """Remove the voxels that a surface hardly touches.
 
-    Where a surface runs along the faces of voxels, the few points that noise has moved across a face have voxels of
-    their own. With one point of each voxel they would have as great a say as all the others, and bend the surface.
+    Where a surface runs along the faces of voxels, noise moves a few points across a face into voxels of their own.
+    With one point per voxel, these few would weigh as much as all the others and bend the surface.
     """
     counts, blocks = np.diff(runs), voxels >> (3 * LEVELS_TO_BLOCK)
     starts = np.flatnonzero(np.diff(blocks, prepend=-1))

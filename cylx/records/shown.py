@@ -1,4 +1,4 @@
-"""What a notebook shows of a record, or of what is read from a file."""
+"""The display of records and results in a notebook."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from importlib import import_module
 
 
 def html_in_notebook(found: object) -> str:
-    """Give the page that `cylx.show` makes of an extraction or a result.
+    """Return the HTML page that `cylx.show` makes of an extraction or a result.
 
-    It is imported by its name when a notebook asks: what shows records knows them, not they it.
+    The report package is imported by name on demand, as it depends on the records and not the reverse.
     """
     return str(import_module("cylx.report").show(found).html)

@@ -1,4 +1,4 @@
-"""Where a cloud came from, and which of its points take part."""
+"""The source of a cloud, and the selection of its points."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ Crop = tuple[Corner, Corner]
 
 @dataclass(frozen=True, slots=True)
 class Selection:
-    """Which points take part; None stands for all of them.
+    """The selection of points to use; None means all.
 
     Parameters
     ----------
     crop : pair of triples of float or None
         The smallest and the largest coordinates, scene units; None sets no bound.
     voxel : float or None
-        Side of cells of which one point each takes part, scene units.
+        Side of the cells in which only one point is used, scene units.
     every : int or None
-        Of the rows of the file, the first of so many takes part.
+        Use only the first of this many rows of the file.
     classes : tuple of int or None
-        Classes of the points, ascending.
+        Use only points of these classes, ascending.
     scan : int or None
-        The scan of a file of several, the first is 0; the others are not read.
+        Number of the scan to read in a file of several, from 0.
     """
 
     crop: Crop | None = None
@@ -55,7 +55,7 @@ class Selection:
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """Where a cloud came from.
+    """The source of a cloud.
 
     Parameters
     ----------
@@ -66,9 +66,9 @@ class Source:
     sha256 : str or None
         Digest of the bytes read; None for an array.
     selection : Selection
-        Which of its points take part.
+        Which of its points are used.
     header : bytes or None
-        What a LAS file has besides its points, so that it can be written again.
+        The parts of a LAS file besides the points, so that it can be written again.
     """
 
     file: str
@@ -79,7 +79,7 @@ class Source:
 
 
 ARRAY = Source("<array>", "array")
-"""The source of a cloud that comes from no file."""
+"""The source of a cloud that is not from a file."""
 
 
 def _check_crop(crop: Crop) -> None:

@@ -1,4 +1,4 @@
-"""A result to look at: a page that explains itself, pictures, and what a notebook shows."""
+"""The display of a result: an HTML report, pictures, and the output in a notebook."""
 
 from __future__ import annotations
 

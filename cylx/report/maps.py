@@ -1,4 +1,4 @@
-"""The surface of a cylinder unrolled: how far its points lie outside and inside, by angle and height."""
+"""The unrolled surface of a cylinder: the residuals of its points by angle and height."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ class ResidualMap:
     Parameters
     ----------
     means : ndarray of shape (rows, columns), int8
-        Multiples of a 127th of `reach`, -128 where there are no points. Rows go up from the start of the axis to its
-        end, columns round it from -180 to 180 degrees.
+        Multiples of a 127th of `reach`, -128 without points. Rows go from the start of the axis to its end, columns
+        around it from -180 to 180 degrees.
     reach : float
         Largest of them, scene units.
     limit : float
         The residual at the end of the colour scale, scene units: that of all but the most extreme cells with more than
-        two points, and no less than twice the noise, so that mere noise is pale.
+        two points, and at least twice the noise, so that mere noise is pale.
     zero : str
-        The coordinate axis that the angle 0 is turned to.
+        The coordinate axis towards which the angle is 0.
     """
 
     means: NDArray[np.int8]
@@ -43,7 +43,7 @@ class ResidualMap:
 def unroll(
     points: FloatArray, residuals: FloatArray, cylinder: Cylinder, noise: float, most_cells: int = MOST_CELLS
 ) -> ResidualMap:
-    """Average the residuals of a cylinder's points in cells of its surface, about square ones.
+    """Average the residuals of a cylinder's points in roughly square cells of its surface.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def unroll(
 
 
 def _cells(cylinder: Cylinder, count: int, most: int) -> tuple[int, int]:
-    """Give the columns and rows of a map: cells about square, with some points in each."""
+    """Return the columns and rows of a map: roughly square cells, with some points in each."""
     cells = float(np.clip(count / POINTS_A_CELL, 8, most))
     shape = 2 * np.pi * cylinder.radius / max(cylinder.height, 1e-9 * cylinder.radius)
     columns = int(np.clip(np.rint(np.sqrt(cells * shape)), 8, MOST_COLUMNS))
@@ -89,7 +89,7 @@ def _cells(cylinder: Cylinder, count: int, most: int) -> tuple[int, int]:
 
 
 def _zero(cylinder: Cylinder) -> tuple[str, float]:
-    """Choose what the angle 0 is turned to: up, or x for a cylinder that stands; and its angle in the frame."""
+    """Choose the direction of angle 0: up, or x for an upright cylinder; return its name and its angle in the frame."""
     name, axis = ("z", 2) if abs(cylinder.direction[2]) < 0.9 else ("x", 0)
     across, along = axis_basis(cylinder.direction)
     return name, float(np.arctan2(along[axis], across[axis]))

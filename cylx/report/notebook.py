@@ -1,7 +1,7 @@
-"""A result in a notebook: its cylinders as a table, and the view in 3-D of the page beside it.
+"""A result in a notebook: a table of its cylinders, and a view in 3-D.
 
-The table is plain HTML, which is all that is left where scripts are not trusted. The view is the page of a report, with
-fewer points and nothing but view and details, in a frame that has no access to the notebook.
+The table is plain HTML and also works where scripts are not trusted. The view is the page of a report with fewer
+points, reduced to view and details, in a frame without access to the notebook.
 """
 
 from __future__ import annotations
@@ -30,24 +30,24 @@ if TYPE_CHECKING:
 MOST_POINTS = 30_000
 MOST_ROWS = 50
 MOST_CYLINDERS = 500
-"""Cylinders in the view; each takes about a kilobyte."""
+"""Maximum number of cylinders in the view; each takes about a kilobyte."""
 MOST_CELLS = 200_000
-"""Of the maps of all cylinders together."""
+"""Maximum number of cells in the maps of all cylinders together."""
 ENOUGH_TO_CHOOSE_FROM = 1_000_000
-"""Points that are looked at; of larger clouds an even choice."""
+"""Maximum number of points processed; larger clouds are thinned evenly."""
 VIEW_HEIGHT = 520
 
 
 @dataclass(frozen=True, slots=True)
 class NotebookView:
-    """What a notebook shows of a result.
+    """The output of a result in a notebook.
 
     Parameters
     ----------
     html : str
-        A table and a frame with a page; complete in itself.
+        A table and a frame with a page; needs no other files.
     text : str
-        One line, for where there is no HTML.
+        One line, for use without HTML.
     """
 
     html: str
@@ -69,19 +69,19 @@ def show(
 ) -> NotebookView:
     """Show a result in a notebook: a table of its cylinders, and a view in 3-D to turn and to click on.
 
-    An `Extraction` or a `Result` that ends a cell is shown like this, too. Nothing is loaded from anywhere; with the
-    points given here a notebook grows by about half a megabyte.
+    An `Extraction` or a `Result` at the end of a cell is shown in the same way. Nothing is loaded from elsewhere. With
+    points, the notebook grows by about half a megabyte.
 
     Parameters
     ----------
     found : Extraction or Result
     cloud : PointCloud or array_like of shape (N, 3), optional
-        The points of a `Result`, as `read_cloud` gives them; those of the annotated cloud are coloured by cylinder.
-        Without it the cylinders are shown alone. An `Extraction` has its own.
+        The points of a `Result`, as returned by `read_cloud`; those of the annotated cloud are coloured by cylinder.
+        Without it only the cylinders are shown. An `Extraction` has its own.
     most_points : int
-        Most points shown, >= 0; each puts about a dozen bytes into the notebook.
+        Maximum number of points shown, >= 0; each adds about a dozen bytes to the notebook.
     height : int
-        Of the view, pixels.
+        Height of the view, pixels.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def show(
     UsageError
         If a cloud is given with an extraction.
     ValueError
-        If the points have not the shape (N, 3).
+        If the shape of the points is not (N, 3).
     """
     view = View.of(found, cloud)
     result = found if isinstance(found, Result) else Result.of(found)
@@ -107,7 +107,7 @@ def show(
 
 
 def _glance(result: Result, view: View, most_points: int) -> dict[str, Any]:
-    """Gather what the page in the frame says: the result, and not how it came about."""
+    """Return the content of the page in the frame: the result without its stages and configuration."""
     view = view.first(MOST_CYLINDERS)
     count = len(view.shapes)
     cylinders = [cylinder.to_object() for cylinder in result.cylinders[:count]]
@@ -123,7 +123,7 @@ def _glance(result: Result, view: View, most_points: int) -> dict[str, Any]:
 
 
 def _table(result: Result) -> str:
-    """Write the table of the cylinders, as HTML."""
+    """Format the table of the cylinders as HTML."""
     cylinders = result.cylinders
     heads = ("id", "radius", "height", "coverage", "confidence")
     lines = [_row(cylinder) for cylinder in cylinders[:MOST_ROWS]]
@@ -137,7 +137,7 @@ def _table(result: Result) -> str:
 
 
 def _row(cylinder: ResultCylinder) -> str:
-    """Write a cylinder as a row of the table."""
+    """Format a cylinder as a row of the table."""
     red, green, blue = cylinder_colors(np.array([cylinder.id]))[0] if cylinder.id < MOST_CYLINDERS else (128,) * 3
     deviation = cylinder.uncertainty.radius if cylinder.uncertainty else None
     cells = (
@@ -151,5 +151,5 @@ def _row(cylinder: ResultCylinder) -> str:
 
 
 def _text(text: str) -> str:
-    """Write a text as HTML; what cannot be shown, as half a pair of surrogates, is a question mark."""
+    """Escape a text for HTML; characters that cannot be encoded, such as half a surrogate pair, become `?`."""
     return escape(text.encode("utf-8", "replace").decode("utf-8"))

@@ -1,4 +1,4 @@
-"""The report as one page of HTML that needs nothing else: no network, no fonts, no library."""
+"""The report as one self-contained HTML page: no network, no fonts, no library."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ if TYPE_CHECKING:
 
 
 def html_of(extraction: Extraction) -> str:
-    """Write an extraction as a page to look at.
+    """Return an extraction as an HTML page.
 
-    The page has the cloud and the cylinders in 3-D, their table, the map of each one's residuals, what was not accepted
-    and why, and the configuration. It holds no times and no folder names: the same input, configuration and seed give
-    the same bytes. It may not load anything: a policy in its head forbids that.
+    The page has the cloud and the cylinders in 3-D, their table, a map of the residuals of each, the rejected fits with
+    their reasons, and the configuration. It holds no times and no folder names: the same input, configuration and seed
+    give the same bytes. A policy in its head forbids it to load anything.
 
     Parameters
     ----------
     extraction : Extraction
-        What a run found out.
+        The output of a run.
 
     Returns
     -------
@@ -36,13 +36,13 @@ def html_of(extraction: Extraction) -> str:
 
 
 def page_of(page_data: dict[str, Any]) -> str:
-    """Write the page of what is to be said.
+    """Return the page for the given content.
 
     Parameters
     ----------
     page_data : dict
-        A JSON object, as `page_data_of` gives it. With `embedded` it has neither `config`, `fields` nor `rejected`, and
-        the page is the view and the details alone, for a frame in another page.
+        A JSON object, as returned by `page_data_of`. With `embedded` it has neither `config`, `fields` nor `rejected`,
+        and the page has only the view and the details, for a frame in another page.
 
     Returns
     -------
@@ -57,22 +57,22 @@ def page_of(page_data: dict[str, Any]) -> str:
         "data": json_for_script(page_data),
         "script": script,
     }
-    pieces = re.split(r"\{\{(\w+)\}\}", _read("page.html"))  # at once: nothing in a part is looked at again
+    pieces = re.split(r"\{\{(\w+)\}\}", _read("page.html"))  # in one pass: inserted parts are not searched again
     return "".join(parts[piece] if place % 2 else piece for place, piece in enumerate(pieces))
 
 
 def json_for_script(content: dict[str, Any]) -> str:
-    """Write a JSON object so that nothing in it can end the element of the page that holds it.
+    """Format a JSON object so that nothing in it can end the element of the page that holds it.
 
     Parameters
     ----------
     content : dict
-        With whatever names the user's files have.
+        May contain any names from the user's files.
 
     Returns
     -------
     str
-        Of ASCII without `<`, `>` and `&`; parses to the same object.
+        ASCII without `<`, `>` and `&`; parses to the same object.
     """
     text = json.dumps(content, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
@@ -84,5 +84,5 @@ def _read(name: str) -> str:
 
 
 def _digest(text: str) -> str:
-    """Name a script or a style in a policy: it, and no other, may run."""
+    """Return the hash of a script or a style for the policy, which allows only these to run."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")

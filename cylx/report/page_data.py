@@ -1,4 +1,4 @@
-"""What a report says, as one JSON object: the result, its points in few bytes, and the map of each cylinder."""
+"""The content of a report as one JSON object: the result, its packed points, and the map of each cylinder."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ if TYPE_CHECKING:
 MOST_POINTS = 500_000
 MOST_REJECTED = 50
 NOISES = 8.0
-"""Residuals are told apart up to so many noises."""
-_OUTLYING = 0.005  # share of the points at either end of a coordinate that the first look need not show
+"""Limit of the packed residuals, in noises."""
+_OUTLYING = 0.005  # share of the points at either end of a coordinate that the first view may leave out
 
 
 def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str, Any]:
-    """Gather what a report says.
+    """Return the content of a report.
 
     Parameters
     ----------
     extraction : Extraction
     most_points : int
-        Most points shown.
+        Maximum number of points shown.
 
     Returns
     -------
     dict
-        A JSON object: `result`, as in the result file but for the configuration, which is the text `config`; `fields`,
-        the properties of the input; the first `rejected`, of `rejected_count`; `view`, what is drawn; `maps`, the
-        unrolled surface of each cylinder.
+        A JSON object: `result`, as in the result file except for the configuration, which is the text `config`;
+        `fields`, the properties of the input; the first `rejected`, of `rejected_count`; `view`, the drawing; `maps`,
+        the unrolled surface of each cylinder.
     """
     result = Result.of(extraction).to_object()
     del result["config"]
@@ -61,19 +61,19 @@ def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict
 
 
 def view_of(view: View, most_points: int) -> dict[str, Any]:
-    """Give what is drawn: points, and cylinders relative to the middle of the box.
+    """Return the content of the view: points, and cylinders relative to the middle of the box.
 
     Parameters
     ----------
     view : View
-        With points, or with cylinders, or with both.
+        With points, cylinders, or both.
     most_points : int
-        Most points drawn.
+        Maximum number of points drawn.
 
     Returns
     -------
     dict
-        A JSON object, as `viewer.js` reads it.
+        A JSON object, the input of `viewer.js`.
     """
     chosen = choose_points(view.labels, most_points, np.random.default_rng(view.seed))
     points, shapes = view.points[chosen], view.shapes
@@ -103,14 +103,14 @@ def view_of(view: View, most_points: int) -> dict[str, Any]:
 
 
 def _unit(view: View) -> float:
-    """Give the noise, or what stands for it where the points have none."""
+    """Return the noise, or a substitute if the noise is 0."""
     residuals = view.residuals[np.isfinite(view.residuals)].astype(np.float64)
     scatter = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else 0.0
     return view.noise or scatter or 1.0
 
 
 def _home(points: FloatArray, shapes: FloatArray) -> dict[str, Any]:
-    """Give the ball that is looked at first: of all but the most outlying points, and of all cylinders."""
+    """Return the ball of the first view: around all but the most outlying points, and all cylinders."""
     low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
     for ends in (shapes[:, :3], shapes[:, 3:6]):
         low = np.minimum(low, (ends - shapes[:, 6:]).min(axis=0, initial=np.inf))
@@ -125,12 +125,12 @@ def maps_of(view: View, most_cells: int = MOST_CELLS) -> list[dict[str, Any]]:
     ----------
     view : View
     most_cells : int
-        Of one map.
+        Maximum number of cells of one map.
 
     Returns
     -------
     list of dict
-        A JSON object a cylinder, as `panels.js` reads it.
+        One JSON object per cylinder, the input of `panels.js`.
     """
     order = np.argsort(view.labels, kind="stable")
     ends = np.searchsorted(view.labels[order], np.arange(len(view.shapes) + 1))
@@ -155,5 +155,5 @@ def maps_of(view: View, most_cells: int = MOST_CELLS) -> list[dict[str, Any]]:
 
 
 def _packed(values: NDArray[Any]) -> str:
-    """Write the bytes of an array as base64, row after row."""
+    """Encode the bytes of an array as base64, row after row."""
     return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode("ascii")

@@ -1,4 +1,4 @@
-"""The result as a picture: points by cylinder, and the outlines of the cylinders, from obliquely above."""
+"""The result as a picture: points by cylinder, and the outlines of the cylinders, obliquely from above."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def png_of(extraction: Extraction) -> bytes:
     Parameters
     ----------
     extraction : Extraction
-        What a run found out.
+        The output of a run.
 
     Returns
     -------
@@ -50,20 +50,20 @@ def png_of(extraction: Extraction) -> bytes:
     picture = io.BytesIO()
     figure = plot_scene(extraction)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # letters of a name that the font has not
+        warnings.simplefilter("ignore", UserWarning)  # about letters of a name that the font lacks
         figure.savefig(picture, format="png", dpi=DPI)
     return picture.getvalue()
 
 
 def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> Figure:
-    """Draw points by cylinder, and the outlines of the cylinders, from obliquely above.
+    """Draw points by cylinder, and the outlines of the cylinders, obliquely from above.
 
     Parameters
     ----------
     found : Extraction or Result
     cloud : PointCloud or array_like of shape (N, 3), optional
-        The points of a `Result`, as `read_cloud` gives them; those of the annotated cloud are coloured by cylinder.
-        An `Extraction` has its own.
+        The points of a `Result`, as returned by `read_cloud`; those of the annotated cloud are coloured by cylinder. An
+        `Extraction` has its own.
 
     Returns
     -------
@@ -102,7 +102,7 @@ def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None 
 
 
 def outline(cylinder: Cylinder) -> list[FloatArray]:
-    """Give the lines a cylinder is drawn by: its two rims, and straight lines between them.
+    """Return the outline of a cylinder: its two rims, and straight lines between them.
 
     Parameters
     ----------
@@ -133,6 +133,6 @@ def _frame(axes: Any, points: FloatArray) -> None:  # noqa: ANN401  (it has no t
 
 
 def _printable(name: str) -> str:
-    """Leave out of a name what cannot be drawn on one line, and the middle of a very long one."""
+    """Remove from a name the characters that cannot be drawn on one line, and the middle of a very long name."""
     name = "".join(letter if letter.isprintable() else "?" for letter in name)
     return name if len(name) <= 80 else f"{name[:38]} … {name[-38:]}"

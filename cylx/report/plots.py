@@ -1,4 +1,4 @@
-"""Plots of the numbers of a result: the unrolled residuals of a cylinder, and radii with how uncertain they are."""
+"""Plots of a result: the unrolled residuals of a cylinder, and radii with their uncertainty."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ DPI = 125
 def plot_residuals(
     found: Extraction | Result, cylinder: int = 0, cloud: PointCloud | ArrayLike | None = None
 ) -> Figure:
-    """Draw the unrolled surface of a cylinder: how far its points lie outside and inside, by angle and height.
+    """Draw the unrolled surface of a cylinder with the residuals of its points, by angle and height.
 
     Parameters
     ----------
@@ -39,13 +39,13 @@ def plot_residuals(
     cylinder : int
         Its `id`.
     cloud : PointCloud, optional
-        The annotated cloud of a `Result`, as `read_cloud` gives it. An `Extraction` has its own.
+        The annotated cloud of a `Result`, as returned by `read_cloud`. An `Extraction` has its own.
 
     Returns
     -------
     matplotlib.figure.Figure
-        Each cell shows the mean residual of its points, blue inside and red outside; what is grey has no points. The
-        angle 0 is the side turned up, or towards x where the cylinder stands; heights begin at `start`.
+        Each cell shows the mean residual of its points, blue inside and red outside; grey cells have no points. The
+        angle 0 is the upper side, or towards x for an upright cylinder; heights begin at `start`.
 
     Raises
     ------
@@ -88,24 +88,24 @@ def plot_residuals(
 
 
 def plot_radii(found: Extraction | Result, reference: Sequence[float] | None = None) -> Figure:
-    """Draw the radius of each cylinder with its standard deviation, or how far it is from what it should be.
+    """Draw the radius of each cylinder with its standard deviation, or its difference from a reference.
 
     Parameters
     ----------
     found : Extraction or Result
     reference : sequence of float, optional
-        A radius for each cylinder to compare with, scene units, in the order of the ids: true, nominal, or of an
-        earlier scan. NaN for one that has none.
+        A radius for each cylinder to compare with, scene units, in the order of the ids: true, nominal, or from an
+        earlier scan. NaN for none.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A dot for each, with a bar of two standard deviations either way where the uncertainty was computed.
+        A dot for each, with a bar of two standard deviations in both directions if the uncertainty was computed.
 
     Raises
     ------
     UsageError
-        If there are not as many references as cylinders, or matplotlib is not installed.
+        If the number of references differs from that of cylinders, or matplotlib is not installed.
     """
     radii, deviations = _radii_of(found)
     if reference is not None and len(reference) != len(radii):
@@ -127,7 +127,7 @@ def plot_radii(found: Extraction | Result, reference: Sequence[float] | None = N
         axes.set_xlabel("radius")
     else:
         axes.axvline(0.0, color="grey", linewidth=0.8)
-        axes.set_xlabel("radius less reference")
+        axes.set_xlabel("radius minus reference")
     axes.set_yticks(rows)
     axes.set_ylim(max(len(radii), 1) - 0.5, -0.5)
     axes.set_ylabel("cylinder")
@@ -137,7 +137,7 @@ def plot_radii(found: Extraction | Result, reference: Sequence[float] | None = N
 
 
 def _radii_of(found: Extraction | Result) -> tuple[FloatArray, list[float | None]]:
-    """Give the radii and their standard deviations, None where there are none."""
+    """Return the radii and their standard deviations, None if unknown."""
     if isinstance(found, Extraction):
         pairs = [(fit.cylinder.radius, fit.radius_sd) for fit in found.cylinders]
     else:
@@ -146,7 +146,7 @@ def _radii_of(found: Extraction | Result) -> tuple[FloatArray, list[float | None
 
 
 def with_deviation(value: float, deviation: float | None) -> str:
-    """Write a number with as many decimals as its standard deviation makes sense of.
+    """Format a number with as many decimals as its standard deviation justifies.
 
     Parameters
     ----------

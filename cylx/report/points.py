@@ -1,4 +1,4 @@
-"""The points a report shows: which of them, and in few bytes."""
+"""Select the points that a report shows, and pack them into few bytes."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.records import PointCloud
 
 STEPS_ACROSS_BOX = 65535
-"""Steps of a coordinate across the box that is shown."""
+"""Number of steps of a coordinate across the bounding box."""
 LEAST_OF_EACH_CYLINDER = 200
-"""Points each cylinder keeps if it has them, however many there are beside it."""
+"""Minimum number of points shown per cylinder, if it has that many."""
 NO_RESIDUAL = -128
 
 
 def choose_points(labels: NDArray[np.int32], most: int, rng: np.random.Generator) -> IndexArray:
-    """Choose the points to show: of each cylinder, and of the rest, evenly along the order of the cloud.
+    """Choose the points to show, from each cylinder and from the rest, evenly along the order of the cloud.
 
     Parameters
     ----------
     labels : ndarray of shape (N,)
         Cylinder of each point, -1 for none.
     most : int
-        Most points chosen.
+        Maximum number of points chosen.
     rng : numpy.random.Generator
-        Chooses one point of each stretch of the order, so that no pattern of a scanner is met.
+        Chooses one point in each stretch of the order, which avoids patterns of the scanner.
 
     Returns
     -------
     ndarray of shape (n,)
-        Indices, shuffled: any beginning of them is an even choice too.
+        Indices, shuffled: any first part of them is also an even choice.
     """
     if len(labels) <= most:
         return rng.permutation(len(labels))
@@ -49,14 +49,14 @@ def choose_points(labels: NDArray[np.int32], most: int, rng: np.random.Generator
 
 
 def _quotas(counts: IndexArray, most: int) -> IndexArray:
-    """Share the points that may be shown out: a few to everybody, the rest by size."""
+    """Distribute the number of points: a minimum to every cylinder, the rest by size."""
     least = np.minimum(counts, min(LEAST_OF_EACH_CYLINDER, most // (2 * len(counts))))
     rest = counts - least
     return np.asarray(least + rest * (most - least.sum()) // rest.sum(), dtype=np.int64)
 
 
 def quantise(points: FloatArray) -> tuple[NDArray[np.uint16], FloatArray, FloatArray]:
-    """Write coordinates as numbers of 16 bits within their bounding box.
+    """Convert coordinates to integers of 16 bits within their bounding box.
 
     Parameters
     ----------
@@ -77,20 +77,20 @@ def quantise(points: FloatArray) -> tuple[NDArray[np.uint16], FloatArray, FloatA
 
 
 def pack_labels(labels: NDArray[np.int32], cylinders: int) -> NDArray[np.unsignedinteger[Any]]:
-    """Write labels in a byte where that is enough, in two where not; the largest number is none."""
+    """Pack labels into one byte each, or two if necessary; the largest number means none."""
     kind = np.dtype("u1" if cylinders <= 255 else "<u2")
     none = np.iinfo(kind).max
     return np.where((labels < 0) | (labels >= none), none, labels).astype(kind)
 
 
 def pack_residuals(residuals: FloatArray, limit: float) -> NDArray[np.int8]:
-    """Write residuals as multiples of a 127th of `limit`, larger ones as it; -128 for none."""
+    """Pack residuals as multiples of a 127th of `limit`, clipped to it; -128 means none."""
     scaled = np.rint(np.clip(np.nan_to_num(residuals) / limit, -1.0, 1.0) * 127)
     return np.where(np.isnan(residuals), NO_RESIDUAL, scaled).astype(np.int8)
 
 
 def original_colors(cloud: PointCloud) -> NDArray[np.uint8] | None:
-    """Give the colour each finite point had in its file, None if it had none.
+    """Return the colour of each finite point in its file, None if it had none.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def original_colors(cloud: PointCloud) -> NDArray[np.uint8] | None:
 
 
 def _byte(values: NDArray[Any]) -> NDArray[np.uint8]:
-    """Bring a colour to 0 to 255: bytes as they are, 16 bits and fractions of one scaled."""
+    """Convert a colour to 0 to 255: bytes as they are, 16 bits and fractions of one scaled."""
     if values.dtype == np.uint16:
         return (values >> 8).astype(np.uint8)
     values = np.nan_to_num(values.astype(np.float64))

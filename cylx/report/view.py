@@ -1,4 +1,4 @@
-"""What there is to see of a result: cylinders, and points if they are at hand, whichever form the result has."""
+"""The drawable content of a result: cylinders, and points if available, from any form of a result."""
 
 from __future__ import annotations
 
@@ -24,26 +24,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class View:
-    """Cylinders and the points about them.
+    """Cylinders and the points around them.
 
     Parameters
     ----------
     name : str
-        Of the cloud.
+        Name of the cloud.
     shapes : tuple of Cylinder
         Scene units; the index is the `id`.
     points : ndarray of shape (N, 3)
-        Scene units; none if they are not at hand.
+        Scene units; empty if not available.
     labels : ndarray of shape (N,), int32
         Cylinder of each point, -1 for none.
     residuals : ndarray of shape (N,), float32
         Signed distance to it, + is outside, scene units; NaN where unknown.
     colors : ndarray of shape (N, 3), uint8, or None
-        That the points came with.
+        Original colours of the points.
     spacing, noise : float
-        Of the scene, scene units.
+        Spacing and noise of the scene, scene units.
     seed : int
-        Of the choice of points.
+        Seed for the choice of points.
     """
 
     name: str
@@ -58,21 +58,21 @@ class View:
 
     @classmethod
     def of(cls, found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> View:
-        """Put together what there is to see.
+        """Collect the drawable content.
 
         Parameters
         ----------
         found : Extraction or Result
         cloud : PointCloud or array_like of shape (N, 3), optional
-            The points of a `Result`. Those of an annotated cloud have their cylinders and residuals; those of any other
-            have none. An `Extraction` has its own.
+            The points of a `Result`. Points of an annotated cloud have their cylinders and residuals; points of any
+            other cloud have none. An `Extraction` has its own.
 
         Raises
         ------
         UsageError
-            If both the extraction and the caller bring points.
+            If a cloud is given with an extraction.
         ValueError
-            If the points have not the shape (N, 3).
+            If the shape of the points is not (N, 3).
         """
         if isinstance(found, Extraction):
             if cloud is not None:
@@ -102,7 +102,7 @@ class View:
         return cls(found.input.file, shapes, cloud.points, labels, residuals, colors, scale.spacing, scale.noise)
 
     def thinned(self, most: int) -> View:
-        """Give about `most` of the points, at equal steps of their order."""
+        """Return about `most` of the points, at equal steps of their order."""
         step = max(1, len(self.points) // max(most, 1))
         if step == 1:
             return self
@@ -117,7 +117,7 @@ class View:
         )
 
     def first(self, count: int) -> View:
-        """Give the first cylinders and all points; those of other cylinders are of none."""
+        """Return the first cylinders and all points; points of the other cylinders lose their labels."""
         if len(self.shapes) <= count:
             return self
         labels = np.where(self.labels < count, self.labels, -1).astype(np.int32)
@@ -125,7 +125,7 @@ class View:
 
 
 def _annotations(cloud: PointCloud, count: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-    """Read cylinder and residual of each point out of an annotated cloud; -1 and NaN where it has none."""
+    """Read cylinder and residual of each point from an annotated cloud; -1 and NaN if it has none."""
     labels, residuals = np.full(len(cloud.points), -1, np.int32), np.full(len(cloud.points), np.nan, np.float32)
     rows: Any = slice(None) if cloud.valid is None else cloud.valid
     table = cloud.table

@@ -1,6 +1,6 @@
-"""What was found as JSON objects and tables: the result, what was rejected, and what the files have in common.
+"""Results as JSON objects and tables: the result, the rejected cylinders, and their common parts.
 
-The names are resolved when they are first used: what needs one file of the room does not wait for the others.
+Names are imported on first use, so that using one file does not import the others.
 """
 
 from __future__ import annotations

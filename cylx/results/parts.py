@@ -1,4 +1,4 @@
-"""What the JSON files have in common: the cloud that was looked at, kinds of numbers, and how they are written."""
+"""Common parts of the JSON files: the input cloud, number types, and text format."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Part(BaseModel):
 
 
 class Bounds(Part):
-    """The smallest box along the coordinate axes that holds all points that took part."""
+    """The smallest box along the coordinate axes that holds all points used."""
 
     min: Vector
     """Smallest coordinates, scene units."""
@@ -36,7 +36,7 @@ class Bounds(Part):
 
 
 class Crop(Part):
-    """A box along the coordinate axes; `null` stands for no bound."""
+    """A box along the coordinate axes; `null` sets no bound."""
 
     min: Corner
     """Smallest coordinates, scene units."""
@@ -45,32 +45,32 @@ class Crop(Part):
 
 
 class Input(Part):
-    """The cloud that was looked at."""
+    """The input cloud, and the selection of its points."""
 
     file: str
     """Name of the file without its folder; `-` for standard input, `<array>` for an array."""
     format: str
     """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `array`."""
     points: Count
-    """Number of points, those without finite coordinates and those that took no part included."""
+    """Number of points, including those without finite coordinates and those not used."""
     sha256: str | None = None
     """Digest of the bytes read; absent for an array."""
     scan: Count | None = None
-    """The scan of several that was read, the first is 0; absent if all were."""
+    """Number of the scan that was read, from 0; absent if all were read."""
     crop: Crop | None = None
-    """Only points in this box took part; absent if there was none."""
+    """The box of the points used; absent if there was none."""
     classes: list[Count] | None = None
-    """Only points of these classes took part; absent if all did."""
+    """The classes of the points used; absent if all were used."""
     every: Annotated[int, Field(ge=1)] | None = None
-    """Only the first of so many rows took part; absent if all did."""
+    """Only the first of this many rows was used; absent if all were used."""
     voxel: Annotated[Number, Field(gt=0)] | None = None
-    """Only one point took part in each cell of this side, scene units; absent if all did."""
+    """Only one point was used in each cell of this side, scene units; absent if all were used."""
     bounds: Bounds
-    """Bounding box of the points that took part."""
+    """Bounding box of the points used."""
 
     @staticmethod
     def keys_of(selection: Selection) -> dict[str, Any]:
-        """Write down which points took part."""
+        """Return the keys of a selection of points."""
         corners = None if selection.crop is None else [list(corner) for corner in selection.crop]
         return {
             "scan": selection.scan,
@@ -81,12 +81,12 @@ class Input(Part):
         }
 
     def is_of(self, selection: Selection) -> bool:
-        """Say whether these points took part, and no others."""
+        """Return whether exactly this selection of points was used."""
         return all(getattr(self, name) == value for name, value in self.keys_of(selection).items())
 
     @classmethod
     def of(cls, extraction: Extraction) -> Input:
-        """Write down what was looked at."""
+        """Describe the input of an extraction."""
         cloud = extraction.cloud
         name = cloud.source.file if cloud.source.format == "array" else Path(cloud.source.file).name
         return cls(
@@ -100,17 +100,17 @@ class Input(Part):
 
 
 def drop_missing(parts: Iterable[dict[str, Any]]) -> None:
-    """Take what was not computed out of parts of a JSON object."""
+    """Remove values that were not computed from parts of a JSON object."""
     for part in parts:
         for key in [key for key, value in part.items() if value is None]:
             del part[key]
 
 
 def plain_numbers(vector: Iterable[float]) -> list[float]:
-    """Turn a vector into plain floats, without negative zeros."""
+    """Convert a vector to plain floats, without negative zeros."""
     return [float(x) + 0.0 for x in vector]
 
 
 def text_of(content: Mapping[str, Any]) -> str:
-    """Give the text of a JSON file, with a newline at its end."""
+    """Return the text of a JSON file, with a newline at its end."""
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

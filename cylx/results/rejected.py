@@ -1,4 +1,4 @@
-"""What was not accepted as a JSON object, `NAME.rejected.json`: with the reason, and the evidence there is.
+"""The rejected cylinders as a JSON object, `NAME.rejected.json`: with the reasons and the available evidence.
 
 Units and keys are those of `cylx.results`; the same input, configuration and seed give the same bytes.
 """
@@ -18,23 +18,23 @@ if TYPE_CHECKING:
 
 
 class Reasoned(Part):
-    """What was not accepted."""
+    """A rejection."""
 
     reason: str
-    """What speaks most against it: a term of the evidence, or a limit that it does not keep."""
+    """The strongest reason: a term of the evidence, or a limit that is exceeded."""
 
 
-class RejectedCylinder(Measured, Reasoned):  # the keys of the last one come first
-    """A shape that was taken for a cylinder, why it was not accepted, and what was measured of it until then."""
+class RejectedCylinder(Measured, Reasoned):  # the keys of the last base class come first
+    """A possible cylinder that was rejected, the reason, and the values measured before the rejection."""
 
     @classmethod
     def of(cls, rejected: RejectedFit) -> RejectedCylinder:
-        """Write down what was not accepted."""
+        """Describe a rejection."""
         return cls(reason=rejected.reason, **cls.keys_of(rejected.fit))
 
 
 class Rejections(Part):
-    """All that was taken for a cylinder of one cloud and not accepted."""
+    """All rejected cylinders of one cloud."""
 
     model_config = ConfigDict(title="cylx.rejected/1")
 
@@ -43,20 +43,20 @@ class Rejections(Part):
     cylx_version: str
     """Version of cylx that wrote it."""
     input: Input
-    """What was looked at."""
+    """The input cloud."""
     config: dict[str, JsonValue]
     """The resolved configuration, every value."""
     rejected: list[RejectedCylinder]
-    """What was not accepted, by confidence; what was refused before anything was measured comes last."""
+    """The rejected cylinders, by confidence; those rejected before measuring come last."""
 
     @classmethod
     def of(cls, extraction: Extraction) -> Rejections:
-        """Write down what an extraction did not accept.
+        """Describe the rejections of an extraction.
 
         Parameters
         ----------
         extraction : Extraction
-            What a run found out.
+            The output of a run.
         """
         return cls(
             cylx_version=__version__,
@@ -66,16 +66,16 @@ class Rejections(Part):
         )
 
     def to_object(self) -> dict[str, Any]:
-        """Give the JSON object; what was not computed is left out."""
+        """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
         drop_missing([content["input"], *content["rejected"]])
         return content
 
     def to_json(self) -> str:
-        """Give the text of the file, with a newline at its end."""
+        """Return the text of the file, with a newline at its end."""
         return text_of(self.to_object())
 
 
 def rejections_schema() -> dict[str, Any]:
-    """Give the JSON schema of the file."""
+    """Return the JSON schema of the file."""
     return Rejections.model_json_schema(by_alias=True)

@@ -38,7 +38,7 @@ class SceneScale(Part):
 
     @classmethod
     def of(cls, scene: Scene) -> SceneScale:
-        """Write down the scale of a scene."""
+        """Describe the scale of a scene."""
         given = [name for name in ("spacing", "noise") if name in scene.given]
         return cls.model_validate(
             {"spacing": float(scene.spacing), "noise": float(scene.noise), "given": given or None}
@@ -46,16 +46,16 @@ class SceneScale(Part):
 
 
 class Stage(Part):
-    """What a stage looked at, what it kept, and why it dropped the rest."""
+    """What came into a stage, what it kept, and why it rejected the rest."""
 
     name: str
-    """The stage."""
+    """The name of the stage."""
     considered: Count
-    """Things that came in."""
+    """Number of inputs."""
     kept: Count
-    """Things that went on."""
+    """Number of outputs."""
     rejected: dict[str, Count]
-    """Reason to count."""
+    """Rejected inputs: count by reason."""
 
 
 class Uncertainty(Part):
@@ -66,13 +66,13 @@ class Uncertainty(Part):
     axis_angle_deg: Length
     """Of the direction of the axis, degrees."""
     axis_offset: Length
-    """Of the place of the axis at its middle, scene units."""
+    """Of the position of the axis at its middle, scene units."""
     covariance: Matrix
     """Of two offsets of the axis, its two tilts and the radius; scene units and radians."""
 
     @staticmethod
     def keys_of(covariance: NDArray[np.float64]) -> dict[str, Any]:
-        """Write down a covariance."""
+        """Return the keys of a covariance."""
         variances = np.maximum(np.diag(covariance), 0.0)
         return {
             "radius": float(np.sqrt(variances[4])),
@@ -83,16 +83,16 @@ class Uncertainty(Part):
 
 
 class CatalogueMatch(Part):
-    """The most likely entry of the catalogue for a cylinder, and whether the cylinder was drawn to it."""
+    """The most likely entry of the catalogue for a cylinder, and whether the cylinder was fitted with its radius."""
 
     decision: Literal["snapped", "ambiguous", "none"]
-    """`snapped`: fitted again with its radius; `ambiguous`: it may be this one; `none`: it is none of them."""
+    """`snapped`: fitted again with its radius; `ambiguous`: it may be this entry; `none`: it is no entry."""
     name: str | None = None
     """Name of the entry; absent if it has none."""
     nominal_radius: Annotated[Number, Field(gt=0)]
     """Radius of the entry, scene units."""
     likelihood_ratio: Annotated[Number, Field(gt=0)]
-    """Of the entry to the stronger of its rivals: the second entry, or none at all; from 1e-9 to 1e9."""
+    """Of the entry to the stronger of its rivals, the second entry or no entry; from 1e-9 to 1e9."""
     free_radius: Annotated[Number, Field(gt=0)]
     """Radius without the catalogue, scene units."""
     free_radius_sd: Length
@@ -100,14 +100,14 @@ class CatalogueMatch(Part):
 
 
 class Numbered(Part):
-    """What has a number."""
+    """An object with a number."""
 
     id: Count
     """Position in the list; `cylinder_id` of its points in the annotated PLY."""
 
 
 class Measured(Part):
-    """The shape of a cylinder and what was measured of it."""
+    """The shape of a cylinder and its measured values."""
 
     axis_point: Vector
     """Middle of the visible extent, on the axis, scene units."""
@@ -122,25 +122,25 @@ class Measured(Part):
     end: Vector
     """Upper end of the visible extent, on the axis, scene units."""
     inliers: Count
-    """Points of its surface; in a result, those that carry its `id`."""
+    """Points of its surface; in a result, those with its `id`."""
     rmse: Length
     """Root mean square distance of the inliers to the surface, scene units."""
     coverage_deg: Annotated[Number, Field(ge=0, le=360)]
     """Angle about the axis that the inliers cover, degrees."""
     support: Count
-    """Candidates in its cluster; of the other methods, hypotheses that led to it."""
+    """Candidates in its cluster; for the other methods, hypotheses that led to it."""
     payoff: Number | None = None
-    """Mean payoff of its cluster, 0 to 1; absent where no game was played."""
+    """Mean payoff of its cluster, 0 to 1; absent if no game was played."""
     confidence: Annotated[Number, Field(ge=0, le=1)] | None = None
-    """Probability that this is a cylinder of the scene; absent where it was not computed."""
+    """Probability that this is a cylinder of the scene; absent if it was not computed."""
     uncertainty: Uncertainty | None = None
-    """Standard deviations of the parameters; absent where they were not computed."""
+    """Standard deviations of the parameters; absent if they were not computed."""
     evidence: dict[str, Number] | None = None
-    """What the verification measured, by the name of the test; absent where nothing was measured."""
+    """The measures of the verification, by name; absent if nothing was measured."""
 
     @staticmethod
     def keys_of(fit: CylinderFit) -> dict[str, Any]:
-        """Write down a fit."""
+        """Return the keys of a fit."""
         shape = fit.cylinder
         evidence = {name: float(value) for name, value in fit.evidence.items() if isfinite(value)}
         return {
@@ -161,27 +161,27 @@ class Measured(Part):
         }
 
 
-class ResultCylinder(Measured, Numbered):  # the keys of the last one come first
+class ResultCylinder(Measured, Numbered):  # the keys of the last base class come first
     """A cylinder and the evidence for it."""
 
     catalogue: CatalogueMatch | None = None
-    """What the catalogue has for it; absent without a catalogue, or where its uncertainty was not computed."""
+    """Its entry of the catalogue; absent without a catalogue, or if its uncertainty was not computed."""
 
     @classmethod
     def of(cls, index: int, fit: CylinderFit) -> ResultCylinder:
-        """Write down cylinder number `index` of an extraction."""
+        """Describe cylinder number `index` of an extraction."""
         match = None if fit.nominal is None else CatalogueMatch.model_validate(fit.nominal, from_attributes=True)
         return cls(id=index, **cls.keys_of(fit), catalogue=match)
 
     def to_object(self) -> dict[str, Any]:
-        """Give the JSON object; what was not computed is left out."""
+        """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json")
         drop_missing([content, content["catalogue"] or {}])
         return content
 
 
 class Result(Part):
-    """The cylinders of one cloud, how they were found, and with which settings they are found again."""
+    """The cylinders of one cloud, with the method and the settings that found them."""
 
     model_config = ConfigDict(title="cylx.cylinders/1")
 
@@ -190,28 +190,28 @@ class Result(Part):
     cylx_version: str
     """Version of cylx that wrote it."""
     input: Input
-    """What was looked at."""
+    """The input cloud."""
     method: Method = "gt"
-    """How the cylinders were found; `gt` is the clustering game."""
+    """The method; `gt` is the clustering game."""
     config: dict[str, JsonValue]
     """The resolved configuration, every value."""
     scene: SceneScale
-    """What the cloud says about itself."""
+    """Scale and noise of the cloud."""
     stages: list[Stage]
     """Counts per stage, in order."""
     cylinders: list[ResultCylinder]
     """The cylinders; empty if there are none."""
     warnings: list[str]
-    """What a user should know before trusting the answer."""
+    """What a user should know before trusting the result."""
 
     @classmethod
     def of(cls, extraction: Extraction) -> Result:
-        """Write down an extraction.
+        """Describe an extraction.
 
         Parameters
         ----------
         extraction : Extraction
-            What a run found out.
+            The output of a run.
         """
         return cls(
             cylx_version=__version__,
@@ -226,14 +226,14 @@ class Result(Part):
 
     @classmethod
     def parse(cls, mapping: Mapping[str, Any], place: str) -> Result:
-        """Read a JSON object.
+        """Parse a JSON object.
 
         Parameters
         ----------
         mapping : mapping
             The object.
         place : str
-            Its name in an error, such as the file.
+            Its name in errors, such as the file.
 
         Raises
         ------
@@ -248,7 +248,7 @@ class Result(Part):
 
     @classmethod
     def from_json(cls, text: str) -> Result:
-        """Read the text of the file, as `to_json` gives it.
+        """Parse the text of the file, as returned by `to_json`.
 
         Parameters
         ----------
@@ -257,7 +257,7 @@ class Result(Part):
         Raises
         ------
         InputError
-            If it is no JSON object, or not a result of this version of the format.
+            If it is not a JSON object, or not a result of this version of the format.
         """
         remedy = "give the text of a JSON file as cylx writes it"
         try:
@@ -266,11 +266,11 @@ class Result(Part):
             fault = "nested too deeply" if isinstance(error, RecursionError) else str(error)
             raise InputError("the text", f"not JSON: {fault}", remedy) from None
         if not isinstance(mapping, dict):
-            raise InputError("the text", "holds no JSON object", remedy)
+            raise InputError("the text", "is not a JSON object", remedy)
         return cls.parse(mapping, "the text")
 
     def to_object(self) -> dict[str, Any]:
-        """Give the JSON object; what was not computed is left out."""
+        """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
         drop_missing([content["input"], content["scene"]])
         return content | {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
@@ -285,20 +285,20 @@ class Result(Part):
         return html_in_notebook(self)
 
     def to_dataframe(self) -> Any:  # noqa: ANN401  pandas is an extra
-        """Give the cylinders as a pandas data frame, its columns those of `cylx.results.table.table_of`."""
+        """Return the cylinders as a pandas data frame with the columns of `cylx.results.table.table_of`."""
         return dataframe_of([cylinder.to_object() for cylinder in self.cylinders])
 
     def to_json(self) -> str:
-        """Give the text of the file, with a newline at its end."""
+        """Return the text of the file, with a newline at its end."""
         return text_of(self.to_object())
 
 
 def result_schema() -> dict[str, Any]:
-    """Give the JSON schema of the result file."""
+    """Return the JSON schema of the result file."""
     return Result.model_json_schema(by_alias=True)
 
 
 def _stage(report: StageReport) -> Stage:
-    """Write down a stage's counts."""
+    """Describe a stage's counts."""
     rejected = {reason: int(count) for reason, count in report.rejected.items()}
     return Stage(name=report.name, considered=int(report.considered), kept=int(report.kept), rejected=rejected)

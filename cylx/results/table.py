@@ -1,4 +1,4 @@
-"""The cylinders of a result as a table: a row a cylinder, a column a number."""
+"""The cylinders of a result as a table: one row per cylinder, one column per number."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ _ALWAYS = (
 
 
 def table_of(cylinders: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
-    """Give the columns of a table of cylinders.
+    """Return the columns of a table of cylinders.
 
-    Vectors have a column for each of x, y and z, and keys of inner objects follow that of the object:
+    Vectors have a column for each of x, y and z. Keys of inner objects follow the name of the object:
     `uncertainty_radius` is the standard deviation of the radius. Matrices are left out.
 
     Parameters
@@ -36,7 +36,7 @@ def table_of(cylinders: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
     Returns
     -------
     dict of str to list
-        Values by column, in the order of the keys; None where a cylinder has none.
+        Values by column, in the order of the keys; None if a cylinder has no value.
 
     Examples
     --------
@@ -50,7 +50,7 @@ def table_of(cylinders: Sequence[Mapping[str, Any]]) -> dict[str, list[Any]]:
 
 
 def dataframe_of(cylinders: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401  pandas may not be there
-    """Give the same table as a pandas data frame.
+    """Return the same table as a pandas data frame.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def dataframe_of(cylinders: Sequence[Mapping[str, Any]]) -> Any:  # noqa: ANN401
 
 
 def _cells(part: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Give the names and values of the columns of one object."""
+    """Yield the names and values of the columns of one object."""
     for key, value in part.items():
         if isinstance(value, Mapping):
             yield from _cells(value, f"{prefix}{key}_")

@@ -1,4 +1,4 @@
-"""What a cloud says of itself: its frame, its noise, and what a configuration means for it."""
+"""The scene: the frame of a cloud, its noise, and the resolved configuration."""
 
 from cylx.scene.frame import canonical_order, cell_cube, check_usable, make_frame, measure_scene
 from cylx.scene.noise import Patches, measure_surface

@@ -1,4 +1,4 @@
-"""What in a cloud will keep cylinders from being found, or make them worse than they look: said before, and beside."""
+"""Cautions: properties of a cloud that prevent cylinders from being found or make them inaccurate."""
 
 from __future__ import annotations
 
@@ -11,37 +11,37 @@ from cylx.geometry.arrays import FloatArray
 from cylx.records import PointCloud, Scene
 
 COORDINATES_SAMPLED = 100_000
-"""Coordinates that are looked at for the steps they are stored in."""
+"""Number of coordinates used to find the step they are stored in."""
 ROUNDING = 12.0**-0.5
-"""Standard deviation of what is rounded to steps of 1."""
+"""Standard deviation of the rounding error for steps of 1."""
 LEAST_GAPS = 10
-"""Fewer gaps than this between coordinates say nothing of a step."""
+"""A step cannot be found with fewer gaps than this between coordinates."""
 CROWDED = 8
-"""So many points to each value that there is: the values are levels."""
+"""With this many points per distinct value, the values are levels."""
 KEYS = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
-"""Odd numbers without a pattern, which make one number of three coordinates."""
+"""Odd numbers without a pattern; they hash three coordinates to one number."""
 COPIES = 0.2
-"""Share of points that are copies of others, from which on the spacing comes out a tenth too small, or more."""
+"""From this share of duplicate points on, the measured spacing is too small by a tenth or more."""
 STRAY_DISTANCE = 5.0
 """Strays are this many times as far out as all others."""
 MOST_STRAYS = 0.2
-"""Of more points than this, it is not clear which are the strays."""
+"""With more points than this far out, it is unclear which ones are strays."""
 FLAT_WITHIN = 5.0
-"""Points within so many standard deviations of their noise lie on one plane."""
+"""A cloud is flat if all points lie within this many standard deviations of the noise of one plane."""
 SLENDER = 1000.0
-"""Scans of degrees beside metres are this many times as high as they are wide."""
+"""A scan in degrees with heights in metres is at least this many times as high as it is wide."""
 
 
 @dataclass(frozen=True, slots=True)
 class Caution:
-    """Something that will go wrong.
+    """A likely problem.
 
     Parameters
     ----------
     kind : str
         One word for programs.
     fault : str
-        What is the matter.
+        What is wrong.
     remedy : str
         What to do about it.
     """
@@ -55,18 +55,18 @@ class Caution:
 
 
 def cautions(whole: PointCloud, cloud: PointCloud, scene: Scene, least: int) -> list[Caution]:
-    """Say what will go wrong with a cloud: all that can be seen without looking for cylinders.
+    """Return the likely problems of a cloud: all that can be found without searching for cylinders.
 
     Parameters
     ----------
     whole : PointCloud
-        As it was read.
+        The cloud as read.
     cloud : PointCloud
-        The points of it that take part; usable (see `cylx.scene.check_usable`).
+        The points that are used; usable (see `cylx.scene.check_usable`).
     scene : Scene
-        Its spacing and noise.
+        Spacing and noise of the cloud.
     least : int
-        Fewest points that a cylinder is accepted with.
+        Minimum number of points of an accepted cylinder.
     """
     points = cloud.points
     bent = _degrees(points)
@@ -76,13 +76,13 @@ def cautions(whole: PointCloud, cloud: PointCloud, scene: Scene, least: int) -> 
 
 
 def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
-    """Say what makes the answer wrong without a sign of it: steps, copies, and noise that hides thin cylinders.
+    """Return problems that make the result wrong without a sign: steps, copies, and noise that hides thin cylinders.
 
     Parameters
     ----------
     cloud : PointCloud
     scene : Scene
-        Its spacing and noise, as measured or given.
+        Spacing and noise of the cloud, measured or given.
     """
     points = cloud.points[:: max(1, len(cloud.points) // COORDINATES_SAMPLED)]
     steps = [step_of(points[:, d]) for d in range(3)]
@@ -92,7 +92,7 @@ def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
 
 
 def step_of(values: FloatArray) -> float:
-    """Give the step in which coordinates are stored: of single precision, of a lattice, or of uneven levels.
+    """Return the step in which coordinates are stored: of single precision, of a lattice, or of uneven levels.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def step_of(values: FloatArray) -> float:
     Returns
     -------
     float
-        0 if there are too few values to tell, or only those steps that double precision has.
+        0 if there are too few values, or only the steps of double precision.
 
     Examples
     --------
@@ -123,23 +123,23 @@ def step_of(values: FloatArray) -> float:
         return single
     step = float(apart.min())
     multiples = apart / step
-    known = multiples < 0.05 * step / rounding  # more of them, and the rounding of the step is no longer small
+    known = multiples < 0.05 * step / rounding  # for larger multiples the rounding of the step is no longer small
     uneven = np.abs(multiples - np.rint(multiples))[known]
     if known.mean() > 0.9 and np.quantile(uneven, 0.99) < 0.1:
         return max(single, float(f"{step:.6g}"))
-    if len(values) >= CROWDED * len(levels):  # depths of a camera: their levels are wider apart further away
+    if len(values) >= CROWDED * len(levels):  # depths of a camera: the distance of levels grows with depth
         nearest = np.minimum(np.append(gaps, gaps[-1]), np.insert(gaps, 0, gaps[0]))
         return max(single, float(np.median(nearest)))
     return single
 
 
 def _single_step(values: FloatArray) -> float:
-    """Give the step that single precision has where the values are."""
+    """Return the step of single precision at the size of the values."""
     return float(np.spacing(np.float32(np.median(np.abs(values)))))
 
 
 def _coarse(points: FloatArray, steps: list[float], scene: Scene) -> Caution | None:
-    """Notice coordinates that are rounded more coarsely than the noise that was measured, which is then wrong."""
+    """Return a caution if coordinates are rounded more coarsely than the measured noise, which is then wrong."""
     axis = int(np.argmax(steps))
     noise = ROUNDING * steps[axis]
     if noise <= scene.noise:
@@ -155,22 +155,22 @@ def _coarse(points: FloatArray, steps: list[float], scene: Scene) -> Caution | N
 
 
 def _copies(points: FloatArray, step: float, scene: Scene) -> Caution | None:
-    """Notice points that are there several times; of a large cloud, those of some keys tell."""
+    """Return a caution if there are duplicate points; in a large cloud a sample of keys is used."""
     keys = np.zeros(len(points), np.uint64)
     for d, factor in enumerate(KEYS):
-        keys += (points[:, d] + 0.0).view(np.uint64)  # so that there is one zero
+        keys += (points[:, d] + 0.0).view(np.uint64)  # + 0.0 turns -0.0 into 0.0
         keys *= np.uint64(factor)
         keys ^= keys >> np.uint64(29)
     some = np.sort(keys[keys % np.uint64(max(1, len(keys) // COORDINATES_SAMPLED)) == 0])
     share = np.count_nonzero(some[1:] == some[:-1]) / max(len(some), 1)
-    if share <= COPIES + (step / scene.spacing) ** 2:  # in cells as wide as a step, some points meet by chance
+    if share <= COPIES + (step / scene.spacing) ** 2:  # in cells as wide as a step, some points coincide by chance
         return None
     fault = f"{share:.0%} of the points are copies of others, and count as if they had been measured"
     return Caution("copies", fault, f"leave them out by --voxel {scene.spacing / 20:.2g}")
 
 
 def _noisy(scene: Scene) -> Caution | None:
-    """Notice noise above the spacing."""
+    """Return a caution if the noise exceeds the spacing."""
     if scene.noise <= scene.spacing:
         return None
     fault = (
@@ -181,7 +181,7 @@ def _noisy(scene: Scene) -> Caution | None:
 
 
 def _missing(whole: PointCloud) -> Caution | None:
-    """Notice a file most of whose rows have no place."""
+    """Return a caution if most rows of a file have no finite coordinates."""
     missing = whole.rows - len(whole.points)
     if 2 * missing <= whole.rows:
         return None
@@ -190,7 +190,7 @@ def _missing(whole: PointCloud) -> Caution | None:
 
 
 def _few(points: FloatArray, least: int) -> Caution | None:
-    """Notice a cloud with fewer points than a cylinder needs."""
+    """Return a caution if the cloud has fewer points than a cylinder needs."""
     if len(points) >= least:
         return None
     fault = f"there are {len(points)} points, and no cylinder is accepted with fewer than {least}"
@@ -198,7 +198,7 @@ def _few(points: FloatArray, least: int) -> Caution | None:
 
 
 def _strays(points: FloatArray) -> Caution | None:
-    """Notice points far away from all others."""
+    """Return a caution if some points are far away from all others."""
     middle = np.median(points, axis=0)
     out = np.sort(np.abs(points - middle).max(axis=1))
     first = int((1.0 - MOST_STRAYS) * len(out))
@@ -217,7 +217,7 @@ def _strays(points: FloatArray) -> Caution | None:
 
 
 def _flat(points: FloatArray, scene: Scene) -> Caution | None:
-    """Notice a cloud that is one plane but for its noise, which bent things can look like if they are thin."""
+    """Return a caution if the cloud is one plane within its noise; thin bent objects can look like that."""
     if scene.noise > scene.spacing:
         return None
     offsets = points - points.mean(axis=0)
@@ -230,7 +230,7 @@ def _flat(points: FloatArray, scene: Scene) -> Caution | None:
 
 
 def _degrees(points: FloatArray) -> Caution | None:
-    """Notice degrees of longitude and latitude beside heights."""
+    """Return a caution if the coordinates look like degrees of longitude and latitude with heights."""
     low, high = points.min(axis=0), points.max(axis=0)
     x, y, z = high - low
     wide = max(x, y)

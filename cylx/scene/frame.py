@@ -1,7 +1,7 @@
-"""What a cloud says about itself: its spacing, its noise, its own frame.
+"""Spacing, noise and frame of a cloud.
 
-The frame has the spacing as its unit, the corner of the cloud as its zero and the Morton curve as the order of the
-points. All stages work in it, which is why unit, origin and order of the points do not change a result.
+The frame has the spacing as its unit, the corner of the cloud as its origin, and the points in Morton order. All
+stages work in it, so unit, origin and order of the points do not change a result.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from cylx.scene.noise import measure_surface
 from cylx.scene.noise_variation import noise_by_place, noise_by_size
 
 STRAY = 40.0
-"""A cloud this many times as wide as its points deviate from their mean may have strays: a few points far away."""
+"""A cloud may have strays (a few points far away) if its width is this many times the deviation from its mean."""
 FAR = 1024.0
 """Points further from the others than this, in widths of 98 % of them, are strays."""
 
 
 def check_usable(points: FloatArray, place: str) -> None:
-    """Refuse a cloud in which no cylinder could be told from anything else.
+    """Refuse a cloud in which no cylinder can be found.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def check_usable(points: FloatArray, place: str) -> None:
     scatter = np.zeros((3, 3))
     fill_scatter(points, low, 1.0 / extent, scatter)
     widths = np.sqrt(np.maximum(np.linalg.eigvalsh(scatter), 0.0))
-    # the covariance of exactly flat points keeps rounding of its own size, and coordinates far away keep theirs
+    # the covariance of exactly flat points has rounding errors of its own size and of the size of the coordinates
     rounding = 1e-7 + 4.0 * float(np.spacing(np.abs([low, high]).max())) / extent
     if widths[1] < rounding:
         raise InputError(place, "all points lie on one line", remedy)
@@ -56,16 +56,16 @@ def check_usable(points: FloatArray, place: str) -> None:
 
 
 def cell_cube(points: FloatArray, enough: float = 0.0) -> tuple[FloatArray, float]:
-    """Give corner and side of the cube that the cells fill: that of all points, but for a few that stray far away.
+    """Return corner and side of the cube for the cells: the bounding cube of all points except a few far strays.
 
-    A single point at zero in a scan with coordinates of millions would leave the scan one cell. Strays stay in the
-    cloud, in the cells at the border.
+    With a single point at zero in a scan with coordinates of millions, the rest of the scan would be one cell. Strays
+    stay in the cloud, in the cells at the border.
 
     Parameters
     ----------
     points : ndarray of shape (N, 3)
     enough : float
-        A cube of this side can be resolved in any case.
+        Up to this side the bounding cube is used as it is, as its cells are fine enough.
     """
     low, high = box_of(points)
     side = float((high - low).max())
@@ -79,16 +79,16 @@ def cell_cube(points: FloatArray, enough: float = 0.0) -> tuple[FloatArray, floa
 
 
 def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray, float]:
-    """Sort points along the Morton curve of their own bounding cube: an order that does not depend on the given one.
+    """Sort points along the Morton curve of their bounding cube; the result does not depend on the input order.
 
     Returns
     -------
     points : ndarray of shape (N, 3)
-        Sorted, from the corner of `cell_cube`.
+        Sorted, relative to the corner of `cell_cube`.
     order : ndarray of shape (N,)
-        Where each sorted point stood.
+        Original index of each sorted point.
     codes : ndarray of shape (N,)
-        Sorted codes.
+        Morton codes of the sorted points.
     unit : float
         Side of the smallest cell.
     """
@@ -101,10 +101,10 @@ def canonical_order(points: FloatArray) -> tuple[FloatArray, IndexArray, IndexAr
 
 
 def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
-    """Read spacing and noise off a cloud.
+    """Measure spacing and noise of a cloud.
 
-    Quadrics are fitted to small neighbourhoods: the residuals show the noise, the density shows the spacing. The noise
-    is the mode over the neighbourhoods, because edges and contacts of surfaces are thicker than a surface and only the
+    Quadrics are fitted to small neighbourhoods: their residuals give the noise, their density the spacing. The noise is
+    the mode over the neighbourhoods: edges and contacts of surfaces are thicker than a surface, and only the values on
     surfaces agree.
 
     Parameters
@@ -124,29 +124,29 @@ def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
 
 
 def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Frame, Scene]:
-    """Measure a cloud and put it into its own frame.
+    """Measure a cloud and transform it to its own frame.
 
     Parameters
     ----------
     points : ndarray of shape (N, 3)
         Scene units, usable (see `check_usable`).
     config : Config
-        Spacing and noise given here are taken as known.
+        Spacing and noise, if given here, are not measured.
     threads : int
-        Do not change the result.
+        Number of threads; does not change the result.
 
     Returns
     -------
     frame : Frame
         The points in units of the spacing, in Morton order.
     scene : Scene
-        What was measured or given, scene units.
+        Measured or given values, scene units.
     """
     ordered, order, codes, unit = canonical_order(points)
     rng = stream(config.seed, "scene")
     spacing, dense, measured, patches = measure_surface(ordered, codes, unit, rng, threads)
     noise = config.scene.noise or measured
-    with ThreadPoolExecutor(1) as pool:  # the noise over larger pieces is measured while the points are put in order
+    with ThreadPoolExecutor(1) as pool:  # measures the noise over larger pieces while the points are sorted
         measuring = pool.submit(noise_by_size, ordered, codes, unit, spacing, measured, rng, threads)
         dense *= (config.scene.spacing or spacing) / spacing
         spacing = config.scene.spacing or spacing
@@ -157,7 +157,7 @@ def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Fr
         corner, side = cell_cube(points, 2.0**BITS * voxel * spacing)
         ordered, side = (points[order] - corner) / spacing, side / spacing
         level = max(0, min(BITS - 1, math.floor(math.log2(2.0**BITS * voxel / (side + voxel)))))
-        unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # of a cloud wider than 2^21 voxels they are coarser
+        unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # coarser for a cloud wider than 2^21 voxels
         codes = morton_codes(ordered, unit, side)
         again = np.argsort(codes, kind="stable")
         places, ratios = ordered[patches.middles], patches.deviations / measured

@@ -1,4 +1,4 @@
-"""Where and over what sizes the noise of a cloud differs."""
+"""Variation of the noise over the cloud and with the size of a piece."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from cylx.geometry.morton import BITS, cell_starts, gather_ball
 from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
 
 MOST_NOISE_FACTOR = 8.0
-"""No place is taken for this many times noisier than usual: what scatters more is no surface."""
+"""Upper limit of the noise of a place relative to the usual noise: larger scatter is not a surface."""
 AGREED = 16
-"""Patches that a cell needs to say something of its own noise."""
+"""Patches that a cell needs for a noise of its own."""
 LARGE_PIECES, POINTS_OF_PIECE = 600, 64
-"""Larger pieces looked at, and the points of each."""
+"""Number of larger pieces, and points of each."""
 
 
 def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tuple[float, IndexArray, FloatArray]:
-    """Measure where the noise exceeds the usual one: in cells that hold enough patches most of which agree.
+    """Measure where the noise exceeds the usual noise: in cells with enough patches, most of which agree.
 
     Parameters
     ----------
     places : ndarray of shape (m, 3)
-        Of patches, from zero.
+        Positions of the patches, from zero.
     ratios : ndarray of shape (m,)
-        Standard deviations of the patches over the usual one.
+        Standard deviations of the patches relative to the usual noise.
     extent : float
         Side of the cube that holds the cloud.
 
     Returns
     -------
     side : float
-        Of the cells.
+        Side of the cells.
     cells : ndarray of shape (C, 3), int64
-        Those of which something is known; none if it is the same everywhere.
+        Cells with a noise of their own; empty if the noise is the same everywhere.
     factors : ndarray of shape (C,)
-        How many times the usual noise there is.
+        Noise in these cells relative to the usual noise.
     """
     none = np.empty((0, 3), np.int64), np.empty(0)
     side = 1.01 * extent
@@ -58,7 +58,7 @@ def noise_by_place(places: FloatArray, ratios: FloatArray, extent: float) -> tup
             continue
         mode = half_sample_mode(own)
         known[c] = (np.abs(np.log(own / mode)) < 0.3).mean() >= 0.6
-        # what is less may be the scatter of the estimate; and a quiet floor says nothing of what stands on it
+        # a smaller value may be scatter of the estimate; and a quiet floor says nothing about the objects on it
         factors[c] = min(mode, MOST_NOISE_FACTOR) if known[c] and mode > 1.3 else 1.0
     if not (factors != 1.0).any():
         return side, *none
@@ -74,10 +74,9 @@ def noise_by_size(
     rng: np.random.Generator,
     threads: int = 1,
 ) -> tuple[FloatArray, FloatArray]:
-    """Measure the noise over larger and larger flat pieces, as long as there are such and most of them agree.
+    """Measure the noise over larger and larger flat pieces, as long as there are enough and most of them agree.
 
-    The residuals of curved pieces show their shape as soon as they are large; those of flat ones show noise at any
-    size.
+    The residuals of large curved pieces show their shape; those of flat pieces show the noise at any size.
     """
     larger = [8.0 * spacing, 16.0 * spacing, 32.0 * spacing, 64.0 * spacing]
     samples = [np.sort(rng.choice(len(points), min(LARGE_PIECES, len(points)), replace=False)) for _ in larger]
@@ -101,7 +100,7 @@ def noise_by_size(
 def _noise_of_flat(
     points: FloatArray, codes: IndexArray, unit: float, size: float, sample: IndexArray, least: float
 ) -> float | None:
-    """Give the noise over the flat ones of pieces of a size; None if there are few of them, or they do not agree."""
+    """Return the noise over the flat pieces of one size; None if there are few, or they do not agree."""
     level = min(BITS, max(0, math.floor(math.log2(size / unit))))
     cells, starts = cell_starts(codes, level)
     patches = np.empty((len(sample), POINTS_OF_PIECE, 3))
@@ -134,7 +133,7 @@ def _fill_patches(
     patches: FloatArray,
     full: MaskArray,
 ) -> None:
-    """Fill each patch with points evenly picked from the ball about a sample point, if it holds enough of them."""
+    """Fill each patch with points picked evenly from the ball about a sample point, if it holds enough points."""
     found = np.empty(40000, np.int64)
     count = patches.shape[1]
     for s in range(len(sample)):

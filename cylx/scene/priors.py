@@ -1,4 +1,4 @@
-"""What a user knows of all cylinders, whatever method finds them: limits, priors and a catalogue, in the frame."""
+"""Prior knowledge of all cylinders, for every method: limits, priors and a catalogue, in frame units."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from cylx.records import Frame, Segment
 
 
 def out_of_range(segment: Segment, radii: tuple[float, float], scene: SceneConfig) -> str:
-    """Name the limit that a segment does not keep, or nothing.
+    """Return the limit that a segment exceeds, or an empty text.
 
     Parameters
     ----------
@@ -31,13 +31,13 @@ def out_of_range(segment: Segment, radii: tuple[float, float], scene: SceneConfi
 
 
 def radius_range(config: Config, frame: Frame) -> tuple[float, float]:
-    """Give the least and the greatest radius looked for in frame units, from a resolved configuration."""
+    """Return the least and the greatest radius to find, in frame units, from a resolved configuration."""
     low, high = config.scene.radius_min, config.scene.radius_max
     return (low or 0.0) / frame.spacing, (high or math.inf) / frame.spacing
 
 
 def known_of(config: Config, frame: Frame) -> Prior | None:
-    """Give what is known of each cylinder in frame units, from a resolved configuration; None if nothing is."""
+    """Return the prior of each cylinder in frame units, from a resolved configuration; None without one."""
     scene = config.scene
     drawn = scene.axis is not None and scene.axis_sd_deg is not None
     if scene.known_radius is None and not drawn:
@@ -51,7 +51,7 @@ def known_of(config: Config, frame: Frame) -> Prior | None:
 
 
 def catalogue_of(config: Config, frame: Frame) -> Catalogue | None:
-    """Give the nominal radii in frame units, from a resolved configuration; None without a catalogue."""
+    """Return the nominal radii in frame units, from a resolved configuration; None without a catalogue."""
     entries = config.scene.catalogue
     if entries is None:
         return None

@@ -1,4 +1,4 @@
-"""The meaning of every `null` in a configuration: what the cloud says of itself, in scene units."""
+"""The value of every `null` in a configuration, from the scale of the cloud, in scene units."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def resolve(config: Config, scene: Scene) -> Config:
 
 
 def thinnest(scene: Scene) -> tuple[float, float]:
-    """Give the least radius that is looked for, and that from which a cylinder that stands free is found as a rule.
+    """Return the least radius searched for, and the radius from which a free-standing cylinder is usually found.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Fewer points for a first look: those of a box or of some classes, one of so many rows, one a voxel."""
+"""Select some of the points: those in a box or of some classes, every n-th row, or one per voxel."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from cylx.errors import InputError
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.records import Crop, PointCloud, Selection
 
-_MOST_CELLS = float(1 << 52)  # along an axis: cells beyond could not be told apart
+_MOST_CELLS = float(1 << 52)  # along an axis; double precision cannot distinguish more
 _CLASSES = "classification"
 
 
 def select(cloud: PointCloud, selection: Selection) -> PointCloud:
-    """Let only some of a cloud's points take part; all rows stay in its table.
+    """Select some of a cloud's points for use; its table keeps all rows.
 
-    A point stays that is in the box, of one of the classes, and in the first row of `every` of the file. Of the points
-    that are left then, one a voxel stays.
+    A point is kept if it is in the box, of one of the classes, and in the first of every `every` rows of the file. Of
+    the points kept so far, one per voxel is kept.
 
     Parameters
     ----------
     cloud : PointCloud
     selection : Selection
-        `scan` is not looked at: reading is where it is obeyed.
+        `scan` is ignored, as it is applied while reading.
 
     Returns
     -------
     PointCloud
-        The cloud itself if nothing is to be left out, or if it is this selection already.
+        The same cloud if nothing has to be left out, or if this selection has been applied to it already.
 
     Raises
     ------
     InputError
         If no point is left, the points have no classes, or the voxels are too small for the coordinates.
     ValueError
-        If the cloud is another selection already: the order would matter, and nobody would know it.
+        If another selection has been applied to the cloud: the order would matter and would not be recorded.
     """
     selection = replace(selection, scan=cloud.source.selection.scan)
     if not selection.narrows or selection == cloud.source.selection:
@@ -68,7 +68,7 @@ def select(cloud: PointCloud, selection: Selection) -> PointCloud:
 
 
 def inside_box(points: FloatArray, crop: Crop) -> MaskArray:
-    """Tell which points are in a box along the axes, its sides included.
+    """Return which points are in a box along the axes, sides included.
 
     Parameters
     ----------
@@ -95,11 +95,11 @@ def inside_box(points: FloatArray, crop: Crop) -> MaskArray:
 
 
 def one_a_voxel(points: FloatArray, side: float) -> IndexArray:
-    """Choose of each voxel the point that is nearest to its middle.
+    """Choose in each voxel the point nearest to its middle.
 
-    The voxels are cubes, and a corner of one of them is at the origin of the coordinates, so that which points are
-    chosen depends neither on their order nor on what else is in the cloud. Of points as near as each other the one with
-    the smallest coordinates is chosen.
+    The voxels are cubes, and the origin of the coordinates is a corner of one of them. Hence the choice depends neither
+    on the order of the points nor on the rest of the cloud. Of points equally near, the one with the smallest
+    coordinates is chosen.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def one_a_voxel(points: FloatArray, side: float) -> IndexArray:
 
 
 def _grouped(cells: FloatArray) -> tuple[IndexArray, IndexArray]:
-    """Give an order in which the points of a voxel follow each other, and a number for the voxel of each."""
+    """Return an order that groups the points by voxel, and the number of the voxel of each point."""
     low = cells.min(axis=0)
     counts = cells.max(axis=0) - low + 1.0
     if counts.prod() < 2.0**62:
@@ -155,7 +155,7 @@ def _classes_of(cloud: PointCloud) -> NDArray[Any]:
 
 
 def _whole_table(cloud: PointCloud) -> NDArray[np.void]:
-    """Give the table; that of a bare cloud is made of its points."""
+    """Return the table; if a cloud has none, make one from its points."""
     if cloud.table is not None:
         return cloud.table
     table = np.empty(cloud.rows, np.dtype([(axis, "f8") for axis in "xyz"]))

@@ -1,1 +1,1 @@
-"""The method, one file a step."""
+"""The stages of the method, one file each."""

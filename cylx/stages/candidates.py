@@ -1,4 +1,4 @@
-"""Ellipse fits -> candidates: the two cylinders that cut a plane in an ellipse, and their polish."""
+"""Ellipse fits -> candidates: the two cylinders that intersect a plane in an ellipse, and their refinement."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
 
 MOST_POINTS_TO_POLISH = 4096
-"""Most points a candidate is polished on."""
+"""Maximum number of points used to polish a candidate."""
 
 
 def axes_of(fit: EllipseFit) -> FloatArray:
-    """Give the two possible axis directions of an ellipse (eq. 4).
+    """Return the two possible axis directions of an ellipse (eq. 4).
 
-    They are the plane's normal, turned about the minor axis by plus or minus arccos(b / a), the angle of eq. 3.
+    They are the plane's normal, rotated about the minor axis by plus or minus arccos(b / a), the angle of eq. 3.
 
     Returns
     -------
@@ -37,7 +37,7 @@ def axes_of(fit: EllipseFit) -> FloatArray:
 
 
 def propose_cylinders(slices: list[list[EllipseFit]]) -> Candidates:
-    """Make two candidates of each ellipse: its centre, its semi-minor axis, and the two directions of eq. 4.
+    """Make two candidates from each ellipse: its centre, its semi-minor axis, and the two directions of eq. 4.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def polish_candidates(
 ) -> Candidates:
     """Fit each candidate to the points within two radii of its centre, and drop those that do not fit.
 
-    Of the two axes of an ellipse only the right one survives this, as a rule.
+    Usually only the right one of an ellipse's two axes passes.
 
     Parameters
     ----------

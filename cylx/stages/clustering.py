@@ -1,7 +1,7 @@
-"""Candidates -> clusters: the game that candidates play (section 3.3).
+"""Candidates -> clusters: the clustering game (section 3.3).
 
-The paper's payoff and its dynamics over all candidates, or the same game at scale: a sparse payoff over the pairs
-within reach and local populations, one neighbourhood after the other.
+Either the paper's payoff and dynamics over all candidates, or the same game at scale: a sparse payoff over pairs of
+nearby candidates, and local populations, one neighbourhood after the other.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from cylx.geometry.arrays import IndexArray
 from cylx.records import Candidates, Cluster, Segment, StageReport
 
 LEAST_SHARE_OF_MEMBER = 0.35
-"""Everybody whose payoff against the equilibrium exceeds this share of the mean belongs to the cluster."""
+"""A candidate belongs to the cluster if its payoff against the equilibrium exceeds this share of the mean."""
 MOST_CANDIDATES_OF_POPULATION = 400
-"""Most candidates of a local population, the best connected ones."""
+"""Most candidates of a local population; the best connected ones are used."""
 
 
 SURVIVING_SHARE = 1e-3
@@ -38,11 +38,12 @@ STOP_SHARE = 0.5
 RADIUS_STEP = 1.25
 """Ratio of the radii of neighbouring cells in which candidates say the same."""
 SMALL_CLUSTERS_TO_END = 3
-"""Where all play, this many small clusters in a row end it: the paper says only "until all are extracted"."""
+"""With the global population, this many small clusters in a row end the game. The paper says only "until all are
+extracted"."""
 
 
 class CandidateGame:
-    """All candidates and their payoffs; gives one cluster after the other.
+    """All candidates and their payoffs; returns one cluster after the other.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ class CandidateGame:
         heapq.heapify(self._heap)
 
     def next_cluster(self) -> Cluster | None:
-        """Play until a cluster emerges; its members are out of the game afterwards. None when nobody is left."""
+        """Play until a cluster emerges and remove its members from the game; return None when no candidate is left."""
         whole = self._config.population == "whole"
         while True:
             nodes = np.flatnonzero(self._alive) if whole else self._neighbourhood()
@@ -100,7 +101,7 @@ class CandidateGame:
             )
             fitness = block @ population
             mean = float(population @ fitness)
-            # the paper's winners are those with a share; here also whoever does well against them
+            # the paper's winners are the candidates with a share; here also those that do well against them
             members = population > (0.0 if not whole else 1.0 / len(nodes) * SURVIVING_SHARE)
             if not whole:
                 members |= fitness > LEAST_SHARE_OF_MEMBER * mean
@@ -120,23 +121,23 @@ class CandidateGame:
                 return None
 
     def withdraw(self, indices: IndexArray) -> None:
-        """Take candidates out of the game: rows and columns zeroed (section 3.5)."""
+        """Remove candidates from the game by setting their rows and columns to zero (section 3.5)."""
         for i in indices[self._alive[indices]]:
             self._alive[i] = False
             columns, values = self._payoff.row(i)
             self._degrees[columns] -= values
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
-        """Give the candidates still in the game that a cylinder accounts for, or that say closely the same."""
+        """Return the remaining candidates that a cylinder explains, or with `closely` those that nearly equal it."""
         return self._places.agreeing(segment, self._alive, *(CLOSELY if closely else EXPLAINED))
 
     def report(self) -> StageReport:
-        """Count the candidates that came in, the clusters, and what was dropped."""
+        """Return the counts of incoming candidates, clusters, and rejections."""
         dropped = {name: count for name, count in self._dropped.items() if count}
         return StageReport("clustering", len(self.candidates), self._clusters, dropped)
 
     def _neighbourhood(self) -> IndexArray | None:
-        """Give the best connected candidate that is left, and those it plays with."""
+        """Return the best connected remaining candidate, and its neighbours."""
         least = STOP_SHARE * self._config.min_payoff * (self._config.min_support - 1)
         while self._heap:
             degree, i = heapq.heappop(self._heap)
@@ -147,7 +148,7 @@ class CandidateGame:
                 continue
             if self._degrees[i] < least:
                 return None
-            self._alive[i] = False  # whatever comes of it, it is not asked again
+            self._alive[i] = False  # not tried again, whatever the outcome
             columns, values = self._payoff.row(i)
             present = self._alive[columns]
             columns, values = columns[present], values[present]
@@ -160,9 +161,9 @@ class CandidateGame:
 
 
 def thin_candidates(candidates: Candidates, most: int = 8) -> Candidates:
-    """Keep the best supported few of the candidates that say the same.
+    """Keep the best supported few of each group of nearly equal candidates.
 
-    A large cylinder has thousands of equal candidates; the game needs enough of them to tell it from chance, not all.
+    A large cylinder has thousands of equal candidates; the game needs only enough of them to tell it from chance.
 
     Parameters
     ----------

@@ -22,14 +22,14 @@ def fit_ellipses(
     rng: np.random.Generator,
     refits: int = 3,
 ) -> list[EllipseFit]:
-    """Find all ellipses of one slice, one after the other in each piece of it, taking away what an ellipse explains.
+    """Find all ellipses of one slice: search each piece, remove the points that an ellipse explains, and repeat.
 
     Parameters
     ----------
     section : Slice
     config : EllipsesConfig
     min_points : int
-        Pieces with fewer points are passed over.
+        Pieces with fewer points are skipped.
     link : float
         Points nearer than this are connected.
     tolerance : float
@@ -37,9 +37,9 @@ def fit_ellipses(
     radius_range : tuple of float
         Least and greatest semi-minor axis, which is the cylinder's radius.
     rng : numpy.random.Generator
-        Of this slice alone.
+        Generator for this slice only.
     refits : int
-        Direct fits of an ellipse to its support, at most.
+        Maximum number of direct fits of an ellipse to its support.
 
     Returns
     -------
@@ -64,7 +64,7 @@ def fit_ellipses(
 
 
 def split_pieces(points: FloatArray, link: float) -> list[IndexArray]:
-    """Split points of the plane into connected pieces: those in the same or adjoining squares of side `link`.
+    """Split points of the plane into connected pieces: points in the same or adjoining squares of side `link`.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def split_pieces(points: FloatArray, link: float) -> list[IndexArray]:
     Returns
     -------
     list of ndarray of int64
-        Indices of the points of each piece; the pieces come by where they are, not by the order of the points.
+        Indices of the points of each piece; pieces are ordered by position, not by the order of the points.
     """
     if len(points) == 0:
         return []
@@ -96,7 +96,7 @@ def split_pieces(points: FloatArray, link: float) -> list[IndexArray]:
 
 @njit(cache=True, nogil=True)
 def _join(rows: IndexArray, columns: IndexArray, roots: IndexArray) -> None:
-    """Give all nodes that edges connect the least of them as their root: union and find."""
+    """Set the root of all connected nodes to the smallest of them: union and find."""
     for e in range(len(rows)):
         a, b = rows[e], columns[e]
         while roots[a] != a:

@@ -1,8 +1,8 @@
-"""Pieces -> whole pipes: a cylinder goes on along its axis where points are too sparse for it to have grown.
+"""Pieces -> whole pipes: extend a cylinder along its axis where the points are too sparse for it to grow.
 
-Growth asks for slices that are filled as those of the piece are. Of a thin pipe that recedes from the scanner only a
-few points a metre are left; but if they lie on the surface that the piece foretells, and next to none beside it, they
-are the pipe's, and tell its direction far better than the piece does.
+Growth requires slices as dense as those of the piece. Where a thin pipe recedes from the scanner, only a few points
+per metre are left. If they lie on the extrapolated surface, and almost none beside it, they belong to the pipe, and
+determine its direction far better than the piece does.
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ Judge = Callable[[Segment, Finding], Finding | None]
 
 EXTENSION_ROUNDS = 6
 MOST_AXIS_ERROR = 0.5
-"""How uncertain the axis may be, in radii, where points are looked for."""
+"""Largest uncertainty of the axis, in radii, at which points are searched for."""
 LENGTH_FACTORS = 4.0, 12.0, 40.0
-"""How many times longer a cylinder may become in one round; what is near is looked at first, and tells the direction
-of what is far."""
+"""Largest factor by which a cylinder may become longer in one round; near points are used first, and determine the
+direction towards far ones."""
 LEAST_POINTS_BEYOND_END = 10
-"""Fewest points that must be found beyond an end."""
+"""Minimum number of points found beyond an end."""
 EXTENSION_DENSITY_RATIO = 4.0
-"""How much denser they must lie on the surface than beside it."""
+"""Minimum ratio of the density on the surface to that beside it."""
 SPARSEST_SHARE = 0.25
-"""Where there is less than this share of the mean number of points a length, the cylinder has ended."""
+"""The cylinder ends where the points per length fall below this share of the mean."""
 WIDEST_GAP_SHARE = 0.5
-"""Widest gap, as a share of what is added."""
+"""Widest gap, as a share of the added length."""
 MOST_CONFIDENCE_LOST = 0.1
-"""How much less confident the longer one may be."""
+"""Largest allowed loss of confidence of the longer cylinder."""
 
 
 def extend(finding: Finding, indexed: IndexedCloud, judge: Judge) -> Finding:
-    """Let a cylinder go on at both ends for as long as there are points on it and next to none beside it.
+    """Extend a cylinder at both ends as long as there are points on it and almost none beside it.
 
     Parameters
     ----------
@@ -47,12 +47,12 @@ def extend(finding: Finding, indexed: IndexedCloud, judge: Judge) -> Finding:
     indexed : IndexedCloud
         The cloud.
     judge : callable
-        Refits and verifies a segment, in the light of what it was; None if it does not pass.
+        Refits and verifies a segment, given the finding it came from; None if it is rejected.
 
     Returns
     -------
     Finding
-        The longer one, or the same.
+        The longer one, or the original.
     """
     for _ in range(EXTENSION_ROUNDS):
         judged = next((one for times in LENGTH_FACTORS if (one := _longer(finding, indexed, judge, times))), None)
@@ -63,14 +63,14 @@ def extend(finding: Finding, indexed: IndexedCloud, judge: Judge) -> Finding:
 
 
 def _longer(finding: Finding, indexed: IndexedCloud, judge: Judge, times: float) -> Finding | None:
-    """Give a cylinder with what lies within so many times its length, if it passes as well as before."""
+    """Return the cylinder extended by up to `times` its length, if it passes as well as before."""
     longer = _lengthened(finding, indexed, times)
     judged = None if longer is None else judge(longer, finding)
     return judged if judged is not None and judged.confidence >= finding.confidence - MOST_CONFIDENCE_LOST else None
 
 
 def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segment | None:
-    """Fit a cylinder to a piece and what lies beyond its ends; None if that is next to nothing."""
+    """Fit a cylinder to a piece and the points beyond its ends; None if there are almost none."""
     model, half = finding.segment.model, finding.segment.half
     noise = indexed.noise_about(model, half)
     allowed = (MOST_AXIS_ERROR * model[RADIUS]) ** 2 - finding.offset_error**2
@@ -107,11 +107,11 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
 
 
 def _end(heights: FloatArray, on: MaskArray, half: float, reach: float, share: float) -> float:
-    """Give the height at which the points on the surface end, `half` if there are too few beyond it.
+    """Return the height at which the points on the surface end; `half` if there are too few beyond it.
 
-    Along the axis each point on the surface counts one, each beside it takes off what is to be expected on the surface,
-    and so does each length without any; the end is where the sum is largest. What lies behind a wide gap is something
-    that crosses.
+    Along the axis each point on the surface counts one. Each point beside it subtracts the number expected on the
+    surface, and each length without points subtracts too; the end is where the sum is largest. Points behind a wide gap
+    belong to something that crosses.
     """
     past = np.flatnonzero((heights > half) & (heights <= reach))
     past = past[np.argsort(heights[past])]

@@ -1,4 +1,4 @@
-"""Cloud, cylinders -> labels and residuals: whose each point is."""
+"""Cloud, cylinders -> labels and residuals: the cylinder of each point."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from cylx.records import IndexedCloud, Segment
 
 
 def label_points(segments: list[Segment], indexed: IndexedCloud) -> tuple[NDArray[np.int32], FloatArray]:
-    """Give each point the cylinder whose surface it is nearest to, within three deviations of it.
+    """Assign each point to the cylinder with the nearest surface, within three standard deviations.
 
     Parameters
     ----------
     segments : list of Segment
     indexed : IndexedCloud
-        The cloud; points of something much flatter than a cylinder are not its own.
+        The cloud; points on surfaces much flatter than a cylinder do not belong to it.
 
     Returns
     -------
@@ -38,7 +38,7 @@ def label_points(segments: list[Segment], indexed: IndexedCloud) -> tuple[NDArra
 
 
 def surface_points(segment: Segment, indexed: IndexedCloud) -> tuple[IndexArray, FloatArray, FloatArray]:
-    """Give the points within three deviations of a segment's surface that may belong to it.
+    """Return the points within three standard deviations of a segment's surface that may belong to it.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Frame -> candidates: slices through windows of every scale, where local curvature has not found what is there.
+"""Frame -> candidates: slices through windows of every scale, where local curvature has found nothing.
 
-The paper's slices through the whole cloud rarely cut a given pipe of a large scene. Slices through windows do, and two
-kinds of them help where points are few: planes in all directions, and one across the longest direction of what is in
-the window, as thick as the window itself, in which a thin pipe is a circle however sparse its points are.
+In a large scene the paper's slices through the whole cloud rarely cut a given pipe. Slices through windows do. Two
+kinds help where points are few: planes in all directions, and a plane across the longest direction of the points in the
+window, as thick as the window. In that one a thin pipe is a circle, however sparse its points are.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from cylx.geometry.numerics import fill_basis
 from cylx.records import Candidates, Explained, Frame, Scale
 
 WINDOW_CAPACITY = 2048
-"""Most points of a window."""
+"""Maximum number of points of a window."""
 SAMPLES = 48
-"""Samples of five points a slice."""
+"""Samples of five points per slice."""
 HALF_THICKNESS = 0.15
-"""Half thickness of a slice in radii of its window."""
+"""Half thickness of a slice, in radii of its window."""
 SLIM = 0.4
-"""A window's points are elongated if they scatter less than this share of their length about their line."""
+"""A window's points are elongated if their scatter about their line is less than this share of their length."""
 LEAST_POINTS_OF_SLICE = 15
-"""Points without which nothing is tried in a window."""
+"""Minimum number of points in a window to search it."""
 COUNTS = ("slices", "too few points", "no ellipse", "does not fit")
 
 
@@ -47,20 +47,20 @@ def slice_windows(
     seed: int,
     threads: int,
 ) -> tuple[Candidates, dict[str, int]]:
-    """Propose a cylinder for each window that holds points nobody has explained.
+    """Propose a cylinder for each window that holds unexplained points.
 
     Parameters
     ----------
     frame : Frame
     explained : Explained
-        What lies in flat windows or on candidates of local curvature; no window is laid there.
+        Points in flat windows or on candidates of local curvature; they get no windows.
     radius_range : tuple of float
         Least and greatest radius, frame units.
     config : SlicingConfig
     scale_ratio : float
         Ratio of successive window radii.
     supported : (int, float)
-        Fewest points of a candidate, and their least share of its window.
+        Minimum number of points of a candidate, and minimum share of the points in its window.
     seed : int
     threads : int
         Does not change the result.
@@ -69,7 +69,7 @@ def slice_windows(
     -------
     candidates : Candidates
     counts : dict of str to int
-        Slices cut, and what became of those without a candidate.
+        Number of slices, and the reasons of those without a candidate.
     """
     parts: list[Candidates] = []
     totals = np.zeros(len(COUNTS), np.int64)
@@ -96,7 +96,7 @@ def _look(
     seed: int,
     threads: int,
 ) -> tuple[FloatArray, IndexArray]:
-    """Look through the windows about all seeds, in chunks over threads; each window draws from its own place."""
+    """Search the windows about all seeds, in chunks over threads; the random draws of a window depend on its place."""
     rows = np.zeros((len(seeds), 9))
     chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 16)))
     noises = frame.noise.about(scale.points[seeds], 2.0 * scale.radius)
@@ -130,7 +130,7 @@ def _look(
 
 @njit(cache=True, nogil=True)
 def _draw(state: int) -> int:
-    """Give the next state of a xorshift generator; its upper bits are as good as random."""
+    """Return the next state of a xorshift generator; its upper bits can be used as random numbers."""
     state ^= (state << 13) & 0x7FFFFFFFFFFFFFFF
     state ^= state >> 7
     state ^= (state << 17) & 0x7FFFFFFFFFFFFFFF
@@ -168,7 +168,7 @@ def _slice_windows(
         rows[s, 7] = 0.0
         for p in range(planes + 1):
             counts[0] += 1
-            # the first one across the longest direction, as thick as the window; then in all directions
+            # the first one across the longest direction, as thick as the window; the others in all directions
             thick, offset, size = HALF_THICKNESS * reach, 0.0, n
             if p == 0:
                 thick, size = math.inf, _pick_slim(around, n, reach, normal, alone)
@@ -194,7 +194,7 @@ def _slice_windows(
                 fits = fits or fit == 2
                 if fit == 2 and quality[0] > rows[s, 7]:
                     move_to_foot(model, seed)
-                    for d in range(7):  # assigning a slice takes seconds to compile, for its message on shapes
+                    for d in range(7):  # a slice assignment takes seconds to compile, for its error message on shapes
                         rows[s, d] = model[d]
                     rows[s, 7], rows[s, 8] = quality[0], quality[1]
             counts[3] += 0 if fits else 1
@@ -202,7 +202,7 @@ def _slice_windows(
 
 @njit(cache=True, nogil=True)
 def _copy_about(points: FloatArray, found: IndexArray, n: int, seed: FloatArray, around: FloatArray) -> None:
-    """Copy the points of a window, its seed at zero."""
+    """Copy the points of a window, with its seed at zero."""
     for a in range(n):
         for d in range(3):
             around[d, a] = points[found[a], d] - seed[d]
@@ -210,9 +210,9 @@ def _copy_about(points: FloatArray, found: IndexArray, n: int, seed: FloatArray,
 
 @njit(cache=True, nogil=True)
 def _pick_slim(xyz: FloatArray, n: int, reach: float, direction: FloatArray, out: FloatArray) -> int:
-    """Fill in the points along the longest direction of what is about zero, if that is slim; count them.
+    """Fill in the points along the longest direction of the points about zero, if they are slim; return their number.
 
-    Of several pipes side by side a smaller part of the window shows the one it was laid about.
+    Among several pipes side by side, a smaller part of the window shows the one at its centre.
     """
     place = np.zeros(3)
     for part in (1.0, 0.6, 0.36):
@@ -232,7 +232,7 @@ def _pick_slim(xyz: FloatArray, n: int, reach: float, direction: FloatArray, out
 
 @njit(cache=True, nogil=True)
 def _fill_samples(state: int, count: int, samples: IndexArray) -> int:
-    """Draw samples of five out of so many; give the next state."""
+    """Draw samples of five out of `count` points; return the next state."""
     for k in range(len(samples)):
         for d in range(5):
             state = _draw(state)
@@ -252,7 +252,7 @@ def _find_shape(
     greatest: float,
     shape: FloatArray,
 ) -> bool:
-    """Fill in the ellipse of a slice, a circle if it lies across a cylinder; False if few points support one."""
+    """Fill in the ellipse of a slice, a circle if it lies across a cylinder; return False if few points support it."""
     if across:
         support = search_circle(flat, n, samples, 3.0 * noise + 0.02 * reach, least, greatest, shape)
     else:
@@ -266,7 +266,7 @@ def _find_shape(
 
 @njit(cache=True, nogil=True)
 def _fill_normal(state: int, normal: FloatArray) -> int:
-    """Draw a direction evenly from the sphere; give the next state."""
+    """Draw a direction evenly from the sphere; return the next state."""
     state = _draw(state)
     z = 2.0 * ((state >> 20) % 1048576) / 1048576.0 - 1.0
     state = _draw(state)
@@ -280,7 +280,7 @@ def _fill_normal(state: int, normal: FloatArray) -> int:
 def _project(
     xyz: FloatArray, n: int, normal: FloatArray, offset: float, thick: float, basis: FloatArray, flat: FloatArray
 ) -> int:
-    """Fill in the coordinates in the plane of the points close to it; count them."""
+    """Fill in the plane coordinates of the points close to a plane; return their number."""
     m = 0
     for i in range(n):
         x, y, z = xyz[0, i], xyz[1, i], xyz[2, i]
@@ -295,7 +295,7 @@ def _project(
 def _set_model(
     normal: FloatArray, offset: float, basis: FloatArray, shape: FloatArray, sign: float, model: FloatArray
 ) -> None:
-    """Set one of the two cylinders that cut a plane in an ellipse: eq. 3 and 4 of the paper."""
+    """Set one of the two cylinders that intersect a plane in an ellipse: eq. 3 and 4 of the paper."""
     cosine = shape[3] / shape[2]
     sine = sign * math.sqrt(max(0.0, 1.0 - cosine * cosine))
     along, across = math.cos(shape[4]), math.sin(shape[4])

@@ -1,4 +1,4 @@
-"""Pieces -> cylinders: one pipe is one cylinder, however many clusters and gaps it came in."""
+"""Pieces -> cylinders: join the pieces of one pipe, whatever clusters and gaps they came from."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HALF = 7
 LEAST_RADIUS_RATIO = 0.75
 """Radii of two pieces of one pipe differ less."""
 MOST_OFFSET_OF_PIECES, ERRORS_OF_OFFSET = 0.3, 4.0
-"""Axes further apart than this, in radii, and so many standard deviations are those of two pipes."""
+"""Axes further apart than this, in radii, and than this many standard deviations belong to two pipes."""
 FAR_APART = 2.0
 """Pieces with a gap of so many of their lengths between them are far apart."""
 SHELL_RADII, SHELL_NOISES, LEAST_WIDTH = 0.1, 5.0, 3.0
@@ -35,26 +35,26 @@ SURFACE_WIDTH, MOST_SPREAD = 3.0, 2.0
 LEAST_SHARES_EXPLAINED = 0.9, 0.8
 """Shares of the points of the larger and the smaller piece that must be on the common surface."""
 LOST_BEYOND_ERROR = 1.0
-"""If the error is more than this many radii, a piece no longer says where its pipe goes on: that may be another, unless
-there are points between the two."""
+"""If the predicted axis error exceeds this many radii, the continuation of a piece may be another pipe, unless there
+are points between the two."""
 MOST_ERROR_OF_PIECES = 4.0
-"""If it is more than this many, not even then."""
+"""If the error exceeds this many radii, two pieces are never joined."""
 LEAST_POINTS_BETWEEN = 12
-"""Fewest points on the surface between two pieces that tell of a pipe there, so sparse that no cluster was found."""
+"""Minimum number of points on the surface between two pieces to show a pipe there, too sparse for a cluster."""
 BRIDGE_DENSITY_RATIO = 4.0
-"""How much denser points must lie on that surface than about it."""
+"""Minimum ratio of the density of points on that surface to that around it."""
 MOST_CHI_SQUARE_IN_LINE = 9.5
 """Chi-square of four angles, which one in twenty true pairs exceeds."""
 ENOUGH_OF_EACH_PIECE = 10000
-"""Points of each piece that suffice to see whether one cylinder explains both."""
+"""Points of each piece used to test whether one cylinder explains both."""
 MOST_CLAIMED_SHARE = 0.5
-"""A cylinder that has more than this share of its points in common with better ones is one of them."""
+"""A cylinder that shares more than this share of its points with better ones is a duplicate."""
 
 Judge = Callable[[Segment, Finding], Finding | None]
 
 
 def merge_pieces(findings: list[Finding], indexed: IndexedCloud, judge: Judge) -> list[Finding]:
-    """Join pairs that one cylinder explains as well as two, until none is left.
+    """Join pairs of cylinders that one cylinder explains as well as two, until no such pair is left.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def merge_pieces(findings: list[Finding], indexed: IndexedCloud, judge: Judge) -
     indexed : IndexedCloud
         The cloud.
     judge : callable
-        Refits and verifies a joined segment, in the light of the better of its parts; None if it does not pass.
+        Refits and verifies a joined segment, given the better of its parts; None if it is rejected.
 
     Returns
     -------
@@ -83,7 +83,7 @@ def merge_pieces(findings: list[Finding], indexed: IndexedCloud, judge: Judge) -
 
 
 def _first_join(pool: list[Finding], i: int, indexed: IndexedCloud, judge: Judge) -> tuple[int, Finding] | None:
-    """Give the first after i that can be joined with it, and what they are together."""
+    """Return the first finding after i that can be joined with i, and the joined finding."""
     rest = pool[i + 1 :]
     if not rest:
         return None
@@ -106,12 +106,12 @@ def _first_join(pool: list[Finding], i: int, indexed: IndexedCloud, judge: Judge
 
 
 def as_rows(segments: Sequence[Segment]) -> FloatArray:
-    """Give segments as rows (n, 8): model and half height."""
+    """Return segments as rows (n, 8): model and half height."""
     return np.array([[*segment.model, segment.half] for segment in segments]).reshape(len(segments), 8)
 
 
 def is_part_of(segment: Segment, known: FloatArray) -> bool:
-    """Tell whether a segment lies on one that is known: axis within a sixth of the radius, radius within a tenth.
+    """Return whether a segment lies on a known one: axis within a sixth of the radius, radius within a tenth.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def is_part_of(segment: Segment, known: FloatArray) -> bool:
 
 
 def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
-    """Drop the cylinders most of whose points better ones have claimed.
+    """Drop the cylinders most of whose points belong to better ones.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
 
 
 def _point_at_each_other(a: Finding, b: Finding) -> bool:
-    """Tell whether the line through the middles of two pieces has the direction of both, as well as these are known."""
+    """Return whether the line through the middles of two pieces has the direction of both, within their errors."""
     across = b.segment.point - a.segment.point
     distance = float(np.linalg.norm(across))
     place = (a.offset_error**2 + b.offset_error**2) / distance**2
@@ -160,7 +160,7 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
 
 
 def _is_bridged(indexed: IndexedCloud, model: FloatArray, half: float, width: float) -> bool:
-    """Tell whether points lie on a cylinder about its middle, and next to none beside its surface."""
+    """Return whether points lie on a cylinder about its middle, and almost none beside its surface."""
     reach = model[RADIUS] + max(0.5 * model[RADIUS], 4.0 * width)
     near = indexed.cells.near_cylinder(model, -half, half, 0.0, reach)
     _, residuals, _ = coordinates_of(indexed.points, near[indexed.may_be_on(near, model[RADIUS])], model)
@@ -171,7 +171,7 @@ def _is_bridged(indexed: IndexedCloud, model: FloatArray, half: float, width: fl
 
 
 def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Judge) -> Finding | None:
-    """Fit one cylinder to two pieces alike and in line within an error; None if it does not explain both."""
+    """Fit one cylinder to two similar pieces in line within an error; return None if it does not explain both."""
     one, two = a.segment, b.segment
     across = two.point - one.point
     height = float(across @ one.direction)

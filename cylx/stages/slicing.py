@@ -15,8 +15,8 @@ from cylx.records import Frame, Slice, stream
 def draw_planes(frame: Frame, config: SlicingConfig, seed: int, axis: list[float] | None = None) -> list[Plane]:
     """Draw N planes: normals evenly from the sphere, each through a point of the cloud.
 
-    The paper says no more than "random center and normal"; a centre drawn from the points cuts where there is something
-    to cut, however large the box about the cloud.
+    The paper says only "random center and normal". A centre drawn from the points cuts through points, however large
+    the bounding box of the cloud.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def draw_planes(frame: Frame, config: SlicingConfig, seed: int, axis: list[float
     config : SlicingConfig
     seed : int
     axis : list of float, optional
-        What `inclination_deg` refers to; not looked at without it.
+        The axis that `inclination_deg` refers to; ignored if `inclination_deg` is null.
 
     Returns
     -------
@@ -39,7 +39,7 @@ def draw_planes(frame: Frame, config: SlicingConfig, seed: int, axis: list[float
 
 
 def _inclined(normals: FloatArray, axis: FloatArray, limits: list[float], rng: np.random.Generator) -> FloatArray:
-    """Bring normals (n, 3) to angles from an axis between two limits, evenly over that part of the sphere."""
+    """Rotate normals (n, 3) to angles from an axis between two limits, evenly over that part of the sphere."""
     low, high = np.cos(np.radians(limits))
     cosines = rng.uniform(high, low, len(normals))
     across = normals - (normals @ axis)[:, None] * axis
@@ -68,7 +68,7 @@ def cut_slice(points: FloatArray, plane: Plane, thickness: float) -> Slice:
 
 @njit(cache=True, nogil=True)
 def _find_close(points: FloatArray, normal: FloatArray, offset: float, width: float, close: IndexArray) -> int:
-    """Fill in the indices of the points near a plane; count them."""
+    """Fill in the indices of the points near a plane; return their number."""
     n = 0
     for i in range(len(points)):
         height = points[i, 0] * normal[0] + points[i, 1] * normal[1] + points[i, 2] * normal[2] - offset

@@ -1,6 +1,6 @@
-"""Scenes whose cylinders are known: the oracle of the tests, the samples and the tutorial.
+"""Synthetic scenes with known cylinders, used by the tests, the samples and the tutorial.
 
-Every scene is determined by its parameters and its seed. Points of even density lie on the surfaces, are moved by
+Every scene is determined by its parameters and its seed. Points lie on the surfaces with even density, are moved by
 isotropic Gaussian noise, and come in random order.
 """
 

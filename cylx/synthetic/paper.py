@@ -33,11 +33,11 @@ def single(
     sigma, sigma_o : float
         Noise of a point and of an outlier, in radii, >= 0.
     p : float
-        Probability of a point to be an outlier, in [0, 1].
+        Probability that a point is an outlier, in [0, 1].
     theta_deg : float
-        Angle of the part of the surface that is seen, degrees, in (0, 360].
+        Angle of the visible part of the surface, degrees, in (0, 360].
     seed : int
-        Seed of everything random, >= 0.
+        Random seed, >= 0.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Where things stand in a room so that nothing touches."""
+"""Placement of objects in a room so that they do not touch."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _ATTEMPTS = 4000
 
 
 class Room:
-    """Keeps capsules (segments with a radius) in a box from touching each other and the walls.
+    """Places capsules (segments with a radius) in a box so that they touch neither each other nor the walls.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class Room:
         self.starts, self.ends, self.radii = np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
 
     def place(self, rng: np.random.Generator, length: float, radius: float, what: str) -> tuple[FloatArray, FloatArray]:
-        """Find room for a capsule; return its middle and its direction."""
+        """Find space for a capsule; return its middle and its direction."""
         for _ in range(_ATTEMPTS):
             direction = random_directions(rng, 1)[0]
             reach = 0.5 * length * np.abs(direction) + radius + self.gap
@@ -46,7 +46,7 @@ class Room:
 
 
 def segment_distances(start: FloatArray, end: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
-    """Give the distance of one segment to each of n others; segments may be single points."""
+    """Return the distance of one segment to each of n others; segments may be single points."""
     own, others, between = end - start, ends - starts, start - starts
     a, e = own @ own, np.einsum("ij,ij->i", others, others)
     b, c, f = others @ own, between @ own, np.einsum("ij,ij->i", others, between)
@@ -54,5 +54,5 @@ def segment_distances(start: FloatArray, end: FloatArray, starts: FloatArray, en
     cross = a * e - b * b
     s = np.where(cross > 1e-12 * a * e, np.clip((b * f - c * e) / np.maximum(cross, tiny), 0, 1), 0.0)
     t = np.clip((b * s + f) / np.maximum(e, tiny), 0, 1)
-    s = np.clip((b * t - c) / max(float(a), tiny), 0, 1)  # the best s for the t that was clipped
+    s = np.clip((b * t - c) / max(float(a), tiny), 0, 1)  # the best s for the clipped t
     return np.asarray(np.linalg.norm(between + s[:, None] * own - t[:, None] * others, axis=1))

@@ -1,4 +1,4 @@
-"""A room with cylinders, and with planes, boxes, spheres, cones and noise beside them."""
+"""A room with cylinders, planes, boxes, spheres, cones and noise."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cylx.synthetic.placement import Room
 from cylx.synthetic.scene import NOISE, OTHER_SURFACE, SyntheticScene, demand, true_cylinder
 from cylx.synthetic.surfaces import Box, Frustum, Mantle, Sphere, Surface, Wall
 
-_OBJECTS_A_ROOM = 10  # fit at ease into a room 12.5 largest radii wide; more objects get a larger one
+_OBJECTS_A_ROOM = 10  # they fit easily into a room 12.5 largest radii wide; more objects get a larger room
 _WIDTH_IN_RADII = 12.5
 _HEIGHT_IN_WIDTHS = 0.75
 
@@ -33,14 +33,14 @@ def multi(
     coverage_min_deg: float = 150.0,
     room: float | None = None,
 ) -> SyntheticScene:
-    """Make a room with cylinders, and with things that are none; nothing touches.
+    """Make a room with cylinders and other objects; nothing touches.
 
     Parameters
     ----------
     points : int
         Number of points, noise included, > 0.
     cylinders, boxes, spheres, cones : int
-        How many of each, >= 0. Cones are frustums with a half-angle of 8 to 20 degrees.
+        Number of each, >= 0. Cones are frustums with a half-angle of 8 to 20 degrees.
     planes : int
         0 to 6: the floor, then four walls, then the ceiling.
     noise : float
@@ -48,11 +48,11 @@ def multi(
     sigma : float
         Standard deviation of the other points about their surface, each coordinate, scene units, >= 0.
     seed : int
-        Seed of everything random, >= 0.
+        Random seed, >= 0.
     radius_min, radius_max : float
-        Range of the cylinders' radii, scene units; log-uniform. The other things are about as large as the largest.
+        Range of the cylinders' radii, scene units; log-uniform. The other objects are about as large as the largest.
     coverage_min_deg : float
-        Each cylinder is seen over an angle between this and 360 degrees.
+        Each cylinder is visible over an angle between this and 360 degrees.
     room : float, optional
         Width and depth of the room, scene units; its height is three quarters of it. By default 12.5 of the largest
         radii, and more if there are more than ten objects.
@@ -119,7 +119,7 @@ def _place_cylinders(
 ) -> list[Mantle]:
     mantles = []
     drawn = np.exp(rng.uniform(np.log(radii[0]), np.log(radii[1]), count))
-    for radius in np.sort(drawn)[::-1]:  # the largest first, while there is room
+    for radius in np.sort(drawn)[::-1]:  # the largest first, while there is space
         height = min(rng.uniform(5, 12) * radius, 0.6 * space.size[0])
         middle, direction = space.place(rng, height, radius, "cylinders")
         arc = np.radians(rng.uniform(coverage_min_deg, 360))
@@ -128,7 +128,7 @@ def _place_cylinders(
 
 
 def _place_clutter(rng: np.random.Generator, space: Room, counts: Mapping[str, int], scale: float) -> list[Surface]:
-    """Place what is no cylinder; `scale` is its typical size, scene units."""
+    """Place the objects other than cylinders; `scale` is their typical size, scene units."""
     clutter: list[Surface] = []
     for _ in range(counts["boxes"]):
         sides = scale * rng.uniform(0.75, 2.5, 3)
@@ -153,7 +153,7 @@ def _draw(
     rng: np.random.Generator, surfaces: Sequence[Surface], total: int, sigma: float
 ) -> tuple[FloatArray, IndexArray, list[FloatArray]]:
     """Draw points at even density; return the noisy ones, the index of their surface, and the exact ones by surface."""
-    demand(surfaces or total == 0, "noise", "must be 1 where there is no surface at all")
+    demand(surfaces or total == 0, "noise", "must be 1 if there is no surface")
     areas = np.array([surface.area for surface in surfaces])
     cuts = np.round(total * np.cumsum(areas) / areas.sum()) if surfaces else areas
     shares = np.diff(cuts, prepend=0).astype(int)

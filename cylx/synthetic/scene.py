@@ -1,4 +1,4 @@
-"""What a synthetic scene is: its points, what each of them is, and the truth about its cylinders."""
+"""A synthetic scene: its points, their labels, and the true cylinders."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from cylx.geometry.cylinder import Cylinder, cylinder_coordinates
 OTHER_SURFACE = -1
 NOISE = -2
 
-_MIN_POINTS = 100  # a cylinder with fewer points, or less coverage, cannot be asked for
+_MIN_POINTS = 100  # a cylinder with fewer points, or less coverage, need not be found
 _MIN_COVERAGE_DEG = 20.0
 _COVERAGE_BINS = 72
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueCylinder:
-    """A cylinder of a synthetic scene, and how much of it is in the cloud.
+    """A cylinder of a synthetic scene, and its visible part.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class TrueCylinder:
     coverage_deg : float
         Angle about the axis that these points cover, in steps of 5 degrees.
     ignore : bool
-        Whether too little of it is in the cloud to ask for it: fewer than 100 points or less than 20 degrees.
+        Whether too little is visible for it to be found: fewer than 100 points or less than 20 degrees.
     """
 
     cylinder: Cylinder
@@ -45,7 +45,7 @@ class TrueCylinder:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SyntheticScene:
-    """A cloud, what each of its points is, and the cylinders that are in it.
+    """A cloud with labels and true cylinders.
 
     Parameters
     ----------
@@ -54,13 +54,13 @@ class SyntheticScene:
     labels : ndarray of shape (N,), int32
         Index of the cylinder a point lies on, -1 on another surface, -2 for noise and outliers.
     cylinders : tuple of TrueCylinder
-        The truth.
+        The true cylinders.
     sigma : float
         Standard deviation of the Gaussian noise of each coordinate, scene units.
     family : str
         `single` or `multi`.
     seed : int
-        Seed of everything random.
+        Random seed.
     params : mapping of str to number
         The other parameters, enough to make the scene again; `scale` and `offset` if it was moved.
     """
@@ -74,7 +74,7 @@ class SyntheticScene:
     params: Mapping[str, Any]
 
     def truth(self) -> dict[str, object]:
-        """Give the truth as a JSON object: lengths in scene units, angles in degrees."""
+        """Return the truth as a JSON object: lengths in scene units, angles in degrees."""
         return {
             "family": self.family,
             "seed": self.seed,
@@ -85,7 +85,7 @@ class SyntheticScene:
         }
 
     def moved(self, scale: float = 1.0, offset: Sequence[float] = (0.0, 0.0, 0.0)) -> SyntheticScene:
-        """Give the scene in another frame: x -> scale x + offset.
+        """Return the scene in another frame: x -> scale x + offset.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class SyntheticScene:
 
 
 def true_cylinder(shape: Cylinder, clean: FloatArray) -> TrueCylinder:
-    """Count what is seen of a cylinder; `clean` are its points before the noise."""
+    """Measure the visible part of a cylinder; `clean` are its points before the noise."""
     angles = cylinder_coordinates(clean, shape.point, shape.direction)[2]
     bins = np.floor((angles / (2 * np.pi) + 0.5) * _COVERAGE_BINS).astype(int) % _COVERAGE_BINS
     coverage_deg = 360.0 / _COVERAGE_BINS * len(np.unique(bins))

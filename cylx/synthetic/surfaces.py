@@ -1,4 +1,4 @@
-"""Surfaces that points are drawn from, evenly."""
+"""Surfaces from which points are drawn evenly."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cylx.geometry.cylinder import Cylinder, axis_basis
 
 
 class Surface(Protocol):
-    """Anything that points can lie on."""
+    """A surface that points can lie on."""
 
     @property
     def area(self) -> float:
@@ -31,7 +31,7 @@ class Mantle:
     shape : Cylinder
         The cylinder.
     first, arc : float
-        Where the part begins and how far it goes about the axis, radians.
+        Start and size of the angular range about the axis, radians.
     """
 
     shape: Cylinder
@@ -53,7 +53,7 @@ class Mantle:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frustum:
-    """The mantle of a cone that is cut off.
+    """The mantle of a truncated cone.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Frustum:
         """Draw n points, evenly over the area; shape (n, 3)."""
         distances = np.sqrt(
             self.narrow**2 + (self.wide**2 - self.narrow**2) * rng.random(n)
-        )  # more area where it is wide
+        )  # the area grows with the radius
         along = self.height * ((distances - self.narrow) / (self.wide - self.narrow) - 0.5)
         return _about_axis(self.middle, self.direction, along, distances, 2 * np.pi * rng.random(n))
 
@@ -150,7 +150,7 @@ class Wall:
     size : ndarray of shape (3,)
         Scene units.
     axis : int
-        The coordinate that is the same all over the face.
+        The coordinate that is constant on the face.
     level : float
         Its value, scene units.
     """

@@ -1,1 +1,1 @@
-"""Many scans: which, in which processes, and what became of each."""
+"""Many scans in one call: which scans, in which processes, and the outcome of each."""

@@ -1,4 +1,4 @@
-"""Many scans: what has to be done, in this process or in several, and what became of each."""
+"""Run all scans of one call, in this process or in several, and report the outcome of each."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ if TYPE_CHECKING:
     from cylx.cli.batch.run import Run
 
 SHORT = 20
-"""Of fewer scans than this, each has its line."""
+"""With fewer scans than this, each one gets a line of its own."""
 
 
 class Batch:
-    """Scans that are done in one call of `cylx extract`.
+    """The scans of one call of `cylx extract`.
 
     Parameters
     ----------
     run : Run
-        How one is done.
+        How one scan is processed.
     jobs : list of Job
         The scans.
     options : BatchOptions
-        How they are done together.
+        The options about many scans.
     summaries : list of str
-        The table and the list to write, or nothing.
+        Names of the summary files to write; empty for no summary.
     """
 
     def __init__(self, run: Run, jobs: list[Job], options: BatchOptions, summaries: list[str]) -> None:
@@ -55,7 +55,7 @@ class Batch:
         self.outcomes: dict[int, Outcome] = {}
 
     def check(self, *, overwrite: bool) -> None:
-        """Refuse to replace what cylx did not write, or must not write once more.
+        """Refuse to overwrite files that cylx did not write, or an existing summary that must not be replaced.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Batch:
             check_writable(name, overwrite=True)
 
     def go(self) -> None:
-        """Do all scans that are not done, show what became of them, and sum up.
+        """Process all scans that are not finished, show the outcomes, and write the summary.
 
         Raises
         ------
@@ -101,17 +101,17 @@ class Batch:
 
     @property
     def profiles(self) -> list[dict[str, object]]:
-        """The times of the scans that were done, in their order."""
+        """The times of the finished scans, in the order of the scans."""
         known = (self.outcomes[index].finished for index in sorted(self.outcomes))
         return [finished.profile for finished in known if finished is not None and finished.profile is not None]
 
     @property
     def peak(self) -> int | None:
-        """The largest memory of any of the processes, bytes."""
+        """The largest memory use of any process, bytes."""
         return max((outcome.peak for outcome in self.outcomes.values() if outcome.peak is not None), default=None)
 
     def _do_only(self, job: Job) -> None:
-        """Do a single scan in this process, showing how far it is, and its cylinders."""
+        """Process a single scan in this process, showing its progress and its cylinders."""
         try:
             before = self._finished_before(job)
             finished = self.run.extract_one(job) if before is None else before
@@ -127,7 +127,7 @@ class Batch:
         self._sum_up()
 
     def _outcomes(self) -> Generator[tuple[int, Outcome], None, None]:
-        """Give what became of each scan, by its place in the list: first those that were done before."""
+        """Yield the index and the outcome of each scan, those finished earlier first."""
         todo = []
         if self.options.resume:
             self._tidy()
@@ -149,12 +149,12 @@ class Batch:
         return None if result is None else Finished(result.input.points, len(result.cylinders), result.warnings)
 
     def _here(self, jobs: Sequence[Job]) -> Generator[tuple[int, Outcome], None, None]:
-        """Do scans one after the other in this process."""
+        """Process scans one after the other in this process."""
         for place, job in enumerate(jobs):
             yield place, attempt(self._silent(), _debug(), job)
 
     def _elsewhere(self, jobs: Sequence[Job], processes: int) -> Generator[tuple[int, Outcome], None, None]:
-        """Do scans in other processes, each with its share of the cores."""
+        """Process scans in other processes, each with its share of the cores."""
         from cylx.cli.batch.workers import Lost, Workers
 
         run = self._silent()
@@ -176,7 +176,7 @@ class Batch:
         return Outcome("skipped", finished)
 
     def _show(self, job: Job, outcome: Outcome) -> None:
-        """Say what became of a scan: always if it failed, otherwise where it is not lost among many."""
+        """Show the outcome of a scan: always if it failed, otherwise only if there are few scans."""
         from cylx.io import printable
 
         if outcome.trace:
@@ -217,7 +217,7 @@ class Batch:
         return is_own_json(name) if Path(name).name == LIST else is_own_table(name)
 
     def _tidy(self, process: int | None = None) -> None:
-        """Remove the temporary files that a process has left where we write, or all processes that have ended."""
+        """Remove temporary files in our folders left by one process, or by all processes that have ended."""
         from cylx.io import remove_leftovers
 
         for folder in {Path(name).resolve().parent for job in self.jobs for name in job.outputs}:

@@ -1,4 +1,4 @@
-"""What is said of a scan when it is done: what was found in it, and where that was written."""
+"""The report on a finished scan: the cylinders found and the files written."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "co
 
 
 def report(messages: Messages, job: Job, extraction: Extraction) -> None:
-    """Say what was found in a scan and where it was written."""
+    """Report the cylinders found in a scan and the files written."""
     if messages.quiet:
         return
     fits = extraction.cylinders
@@ -38,7 +38,7 @@ def report(messages: Messages, job: Job, extraction: Extraction) -> None:
 
 
 def found_line(job: Job, found: int) -> str:
-    """Write how many cylinders a scan has, and where they were written."""
+    """Format the number of cylinders in a scan and the names of the files written."""
     from cylx.io import printable
 
     written = [printable(name) for name in job.written(found) if name != "-"]
@@ -48,7 +48,7 @@ def found_line(job: Job, found: int) -> str:
 
 
 def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
-    """Write one line of the table of cylinders."""
+    """Format one row of the table of cylinders."""
     shape = fit.cylinder
     direction = " ".join(f"{x:.3f}".replace("-0.000", "0.000") for x in shape.direction)
     numbers = [f"{shape.radius:.5g}", f"{shape.height:.4g}", f"{fit.coverage * 57.29577951308232:.0f}°"]
@@ -63,7 +63,7 @@ def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
 
 
 def _nominal(fit: CylinderFit) -> str:
-    """Name the entry of the catalogue that a cylinder was drawn to, in doubt with a question mark."""
+    """Return the catalogue entry assigned to a cylinder, with a question mark if it is ambiguous."""
     nominal = fit.nominal
     if nominal is None or nominal.decision == "none":
         return "-"
@@ -71,7 +71,7 @@ def _nominal(fit: CylinderFit) -> str:
 
 
 def _stage_rows(extraction: Extraction) -> list[list[str]]:
-    """Write the lines of the table of stages."""
+    """Format the rows of the table of stages."""
     return [
         [
             stage.name,

@@ -1,4 +1,4 @@
-"""Which files a run writes: their names, that none of them is in the way, and that they appear together."""
+"""The output files of a run: name them, check that none is in the way, and write them together."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ REPORT, PICTURE, MESH = ".report.html", ".cylinders.png", ".cylinders.obj"
 
 @dataclass(frozen=True)
 class Job:
-    """One scan and the files to write for it.
+    """One scan and its output files.
 
     Parameters
     ----------
@@ -31,17 +31,17 @@ class Job:
     result : str
         The JSON, `-` for standard output.
     annotated : str or None
-        The annotated cloud, `-` for standard output, None for none.
+        The annotated cloud, `-` for standard output, None to write none.
     rejected : str or None
-        The JSON of what was not accepted, `-` for standard output, None for none.
+        The JSON of the rejected fits, `-` for standard output, None to write none.
     report : str or None
-        The page to look at, `-` for standard output, None for none.
+        The HTML report, `-` for standard output, None to write none.
     picture : str or None
-        The PNG, `-` for standard output, None for none.
+        The PNG, `-` for standard output, None to write none.
     mesh : str or None
-        The mesh of the cylinders, None for none.
+        The mesh of the cylinders, None to write none.
     units : str or None
-        Unit of the scan, for meshes that have one; None if it was not said.
+        Unit of the scan, for mesh formats that have a unit; None if unknown.
     """
 
     scan: str
@@ -55,12 +55,12 @@ class Job:
 
     @property
     def outputs(self) -> list[str]:
-        """What it may write."""
+        """The files that may be written."""
         names = (self.result, self.annotated, self.rejected, self.report, self.picture, self.mesh)
         return [name for name in names if name is not None]
 
     def written(self, found: int) -> list[str]:
-        """Leave out what is not written if so many cylinders are found: of none there is no mesh."""
+        """Return the files written for this number of cylinders; without cylinders there is no mesh."""
         return [name for name in self.outputs if found or name != self.mesh]
 
 
@@ -77,10 +77,10 @@ def plan_jobs(
 ) -> list[Job]:
     """Name the outputs of every scan.
 
-    They lie beside the scan, or where `-o` says: a file for one scan, a folder for one or several. The annotated cloud
-    lies beside the JSON; what was not accepted, the report, the picture and the mesh are written only where an option
-    says. What comes from standard input goes to standard output, unless `-o` says otherwise, and what goes to standard
-    output goes there alone, unless an annotated cloud is asked for.
+    The outputs lie beside the scan, or where `-o` says: a file for one scan, a folder for one or several. The annotated
+    cloud lies beside the JSON. The rejected fits, the report, the picture and the mesh are written only if an option
+    asks for them. A scan from standard input goes to standard output unless `-o` names a file. If the JSON goes to
+    standard output, the annotated cloud is written only on request.
 
     Parameters
     ----------
@@ -116,12 +116,12 @@ def plan_jobs(
 
 
 def check_apart(inputs: Sequence[str], outputs: Sequence[str]) -> None:
-    """Refuse outputs that are the same file as another output, or as an input.
+    """Refuse outputs that name the same file as another output or an input.
 
     Raises
     ------
     UsageError
-        If two are the same.
+        If two names are the same file.
     """
     taken = {os.path.realpath(name): "is an input as well as an output" for name in inputs if name != STREAM}
     for name in outputs:
@@ -133,21 +133,21 @@ def check_apart(inputs: Sequence[str], outputs: Sequence[str]) -> None:
 
 
 def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool) -> None:
-    """Refuse outputs that could not be written, before anything is computed.
+    """Refuse outputs that cannot be written, before anything is computed.
 
     Parameters
     ----------
     jobs : sequence of Job
-        The scans; those that are not there are left to fail on their own.
+        The scans; a missing scan is not checked here and fails later.
     others : sequence of str
-        Further files to be written.
+        Further files to write.
     overwrite : bool
-        Whether files that exist may be replaced.
+        Whether existing files may be replaced.
 
     Raises
     ------
     OutputError
-        If one of them could not be written.
+        If one of them cannot be written.
     """
     from cylx.io import check_writable
 
@@ -157,12 +157,12 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
 
 
 def check_format(job: Job, cloud: PointCloud) -> None:
-    """Refuse an annotated cloud of a format that could not hold the scan, before anything is computed.
+    """Refuse a format of the annotated cloud that cannot hold the scan, before anything is computed.
 
     Raises
     ------
     OutputError
-        If it could not.
+        If the format cannot hold it.
     """
     from cylx.io import check_annotated
 
@@ -171,7 +171,7 @@ def check_format(job: Job, cloud: PointCloud) -> None:
 
 
 def _mesh(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
-    """Make the mesh that is asked for, and what its reader has to know."""
+    """Make the requested mesh, with remarks for its reader."""
     if job.mesh is None:
         return None, []
     from cylx.cli.batch.meshes import mesh_of
@@ -180,12 +180,12 @@ def _mesh(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
 
 
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]:
-    """Write the JSON, and what else was asked for of one scan, all or nothing.
+    """Write the JSON and the other requested outputs of one scan, all or nothing.
 
     Returns
     -------
     list of str
-        What the reader of a mesh has to know.
+        Remarks for the reader of the mesh.
 
     Raises
     ------
@@ -201,10 +201,10 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
     with contextlib.ExitStack() as stack:
 
         def staged(name: str) -> str | Path:
-            """Give the name to write an output to for now."""
+            """Return the temporary name to write an output to."""
             return stack.enter_context(moved_at_the_end(name, overwrite=overwrite))
 
-        result = staged(job.result)  # the first is moved last: where the result is, all is
+        result = staged(job.result)  # renamed last: if the result exists, the other outputs do too
         if job.annotated is not None:
             write_annotated(staged(job.annotated), extraction, overwrite=overwrite)
         if job.rejected is not None:
@@ -218,13 +218,13 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
         if job.mesh is not None and mesh is not None:
             write_bytes(staged(job.mesh), mesh, overwrite=overwrite)
         write_text(result, content.to_json(), overwrite=overwrite)
-    if job.mesh is not None and mesh is None:  # that of an earlier result does not belong to this one
+    if job.mesh is not None and mesh is None:  # an old mesh does not belong to this result
         Path(job.mesh).unlink(missing_ok=True)
     return remarks
 
 
 def _looks(job: Job, extraction: Extraction) -> tuple[str, bytes]:
-    """Make the report and the picture of a scan, if they are asked for."""
+    """Make the report and the picture of a scan, if requested."""
     if job.report is None and job.picture is None:
         return "", b""
     from cylx.report import html_of, png_of
@@ -255,14 +255,14 @@ def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str |
 
 
 def _stem(scan: str) -> str:
-    """Give the NAME in the names of the outputs of a scan."""
+    """Return the stem (NAME) of the output names of a scan."""
     from cylx.io import cloud_name
 
     return "stdin" if scan == STREAM else Path(cloud_name(scan)).stem
 
 
 def _annotated(scan: str) -> str:
-    """Give the ending of the annotated cloud: LAS and LAZ keep their format, the others become PLY."""
+    """Return the suffix of the annotated cloud: LAS and LAZ keep their format, other formats become PLY."""
     from cylx.io import LAS_SUFFIXES
 
     suffix = Path(scan).suffix.lower()
@@ -270,24 +270,24 @@ def _annotated(scan: str) -> str:
 
 
 def _inside(output: str, scan: str, ending: str) -> str:
-    """Name an output that may be a folder to put it into."""
+    """Return the path of an output inside `output` if that is a folder, otherwise `output`."""
     return str(Path(output) / (_stem(scan) + ending)) if is_folder(output) else output
 
 
 def is_folder(output: str) -> bool:
-    """Tell whether an output is a folder, or is written as if it were one."""
+    """Return whether an output is a folder, or its name ends like one."""
     return output != STREAM and (Path(output).is_dir() or is_slashed(output))
 
 
 def is_slashed(output: str) -> bool:
-    """Tell whether an output is written as a folder, which is then made."""
+    """Return whether the name of an output ends in a slash; such a folder is created."""
     return output.endswith(("/", os.sep))
 
 
 def _check_batch(
     scans: Sequence[str], output: str | None, annotated: str | None, folders: Mapping[str, str | None]
 ) -> None:
-    """Refuse what works for one scan only; `folders` are options that name a folder for several."""
+    """Refuse options that work for one scan only; `folders` are options that must name a folder for several scans."""
     if STREAM in scans:
         raise UsageError("-", "standard input is one of several inputs", "give it alone")
     if annotated is not None:
@@ -310,9 +310,9 @@ def _check_twins(jobs: Sequence[Job]) -> None:
         twin = first.setdefault(os.path.realpath(job.result), job.scan)
         if twin != job.scan:
             fault = f"would be the result of {twin} and of {job.scan}"
-            raise UsageError(job.result, fault, "rename one of them, or take each by itself into a folder of its own")
+            raise UsageError(job.result, fault, "rename one of them, or run each by itself into its own folder")
 
 
 def _is_there(scan: str) -> bool:
-    """Say whether an input can be looked for; what is missing is reported by whoever reads it."""
+    """Return whether an input exists as far as can be checked; the reader reports missing files."""
     return scan == STREAM or (Path(scan).exists() and not Path(scan).is_dir())

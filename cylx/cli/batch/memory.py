@@ -1,4 +1,4 @@
-"""How much memory there is, and how much of it a scan will need."""
+"""The available memory, and the memory a scan will need."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ import re
 from pathlib import Path
 
 BASE, A_POINT = 250_000_000, 200
-"""Peak memory of a run, bytes, and of each point in it; measured, see 'Growth' in docs/benchmarks.md."""
+"""Peak memory of a run and per point, bytes; measured, see 'Growth' in docs/benchmarks.md."""
 MEMINFO, CONTAINER = Path("/proc/meminfo"), Path("/sys/fs/cgroup")
-"""Where Linux tells what is free, and what a container may have."""
+"""Where Linux reports free memory and the limit of a container."""
 
 
 def memory_needed(scan: str) -> int:
@@ -21,12 +21,12 @@ def memory_needed(scan: str) -> int:
 
 
 def memory_for(points: int) -> int:
-    """Estimate the peak memory of the extraction of so many points, bytes."""
+    """Estimate the peak memory of an extraction of this many points, bytes."""
     return BASE + A_POINT * points
 
 
 def free_memory() -> float | None:
-    """Give the memory that programs can have without swapping, bytes; None where the system does not tell."""
+    """Return the memory that programs can use without swapping, bytes; None if the system does not report it."""
     found = re.search(r"^MemAvailable:\s*(\d+) kB", _read(MEMINFO), re.MULTILINE)
     if found is None:
         return None
@@ -34,7 +34,7 @@ def free_memory() -> float | None:
 
 
 def _left_to_container() -> float:
-    """Give what the limit of a container leaves, bytes; infinity without one. What is only cached counts as free."""
+    """Return the memory left below the limit of a container, bytes; infinity without a limit. Cache counts as free."""
     limit, used = _read(CONTAINER / "memory.max").strip(), _read(CONTAINER / "memory.current").strip()
     if not (limit.isdecimal() and used.isdecimal()):
         return math.inf
@@ -50,7 +50,7 @@ def _read(path: Path) -> str:
 
 
 def memory_held(process: int) -> int:
-    """Give the resident memory of a process, bytes; 0 where the system does not tell."""
+    """Return the resident memory of a process, bytes; 0 if the system does not report it."""
     try:
         pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE")
@@ -59,8 +59,8 @@ def memory_held(process: int) -> int:
 
 
 def cores() -> int:
-    """Give the number of cores that this process may use."""
+    """Return the number of cores that this process may use."""
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # macOS and Windows do not tell
+    except AttributeError:  # not available on macOS and Windows
         return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""The mesh that `cylx extract` writes beside a result, and what `cylx export` has in common with it."""
+"""The mesh that `cylx extract` writes beside a result, and code shared with `cylx export`."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ if TYPE_CHECKING:
 
 
 def check_meshes(names: Sequence[str], units: str | None) -> None:
-    """Refuse meshes that could not be written, before anything is computed.
+    """Refuse meshes that cannot be written, before anything is computed.
 
     Parameters
     ----------
     names : sequence of str
-        Files; none if no mesh is wanted.
+        Names of the meshes; empty if no mesh is wanted.
     units : str or None
         Unit of the scan.
 
     Raises
     ------
     UsageError
-        If a suffix is that of no mesh, or the unit or the library is missing, or there is no mesh for the unit.
+        If a suffix is not that of a mesh, the unit or the library is missing, or the format cannot have the unit.
     """
     if not names:
         if units is not None:
-            raise UsageError("--units", "is that of a mesh, and none is asked for", "give --mesh FILE, or leave it out")
+            raise UsageError("--units", "is for meshes, and none is requested", "give --mesh FILE, or leave it out")
         return
     from cylx.export import format_of
 
@@ -37,7 +37,7 @@ def check_meshes(names: Sequence[str], units: str | None) -> None:
         known = format_of(name)
         if known.home != "meshes":
             remedy = "use .ply, .obj, .glb or .stl; 'cylx export' writes the others"
-            raise UsageError(f"--mesh {name}", f"{known.suffix} is no mesh", remedy)
+            raise UsageError(f"--mesh {name}", f"{known.suffix} is not a mesh format", remedy)
         known.demand(name, units)
 
 
@@ -47,7 +47,7 @@ def mesh_of(name: str, cylinders: Sequence[ResultCylinder], units: str | None) -
     Parameters
     ----------
     name : str
-        Its file, whose suffix says the format.
+        File name; its suffix selects the format.
     cylinders : sequence of ResultCylinder
     units : str or None
         Unit of the scan.
@@ -57,19 +57,19 @@ def mesh_of(name: str, cylinders: Sequence[ResultCylinder], units: str | None) -
     mesh : bytes or None
         None if there is no cylinder: a mesh cannot be empty.
     remarks : list of str
-        What its reader has to know.
+        Remarks for the reader.
     """
     from cylx.export import format_of, render
 
     if not cylinders:
-        return None, [f"{name}: is not written, as there is no cylinder"]
+        return None, [f"{name}: not written, as there are no cylinders"]
     drawing = drawing_of(cylinders, units, name)
     exported = render(drawing, format_of(name), name)
     return exported.data, remarks_on(drawing, {name: exported})
 
 
 def drawing_of(cylinders: Sequence[ResultCylinder], units: str | None, place: str) -> Drawing:
-    """Draw the cylinders of a result, in the colours that they have in the annotated cloud."""
+    """Return a drawing of the cylinders of a result, in their colours in the annotated cloud."""
     import numpy as np
 
     from cylx.export import draw
@@ -80,12 +80,12 @@ def drawing_of(cylinders: Sequence[ResultCylinder], units: str | None, place: st
 
 
 def remarks_on(drawing: Drawing, written: dict[str, Exported]) -> list[str]:
-    """Say what the reader of some files has to know."""
+    """Return remarks for the reader of the written files."""
     out = []
     if drawing.flat and any(not name.lower().endswith(".csv") for name in written):
-        out.append(f"of height 0, and only in tables: cylinder {', '.join(map(str, drawing.flat))}")
+        out.append(f"height 0, written to tables only: cylinder {', '.join(map(str, drawing.flat))}")
     for name, exported in written.items():
         if exported.offset is not None:
             x, y, z = exported.offset
-            out.append(f"{name}: add {x:.0f} {y:.0f} {z:.0f} to all coordinates; they are too large for its numbers")
+            out.append(f"{name}: add {x:.0f} {y:.0f} {z:.0f} to all coordinates; they are too large for the file")
     return out

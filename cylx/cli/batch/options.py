@@ -1,4 +1,4 @@
-"""What was asked for with many scans in mind, and the folder that their outputs go to."""
+"""The options for many scans, and the folder for their outputs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ AUTO = 0
 
 
 class BatchOptions(NamedTuple):
-    """What was asked for with many scans in mind.
+    """The options for many scans.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class BatchOptions(NamedTuple):
     recursive : bool
         `--recursive`.
     jobs : int or None
-        `--jobs`; 0 for as many as there is room for, None for this process alone.
+        `--jobs`; 0 for as many as cores and memory allow, None for this process alone.
     resume : bool
         `--resume`.
     summary : bool or None
@@ -40,37 +40,37 @@ class BatchOptions(NamedTuple):
     summary: bool | None
 
     def output(self, output: str | None) -> str | None:
-        """Give what `-o` amounts to, a folder that is to be made having a slash at its end.
+        """Return the value of `-o` or `--out-dir`; a folder that has to be created ends in a slash.
 
         Raises
         ------
         UsageError
-            If `-o` is given, too, or the folder is something else.
+            If both are given, or the folder is a file.
         """
         if self.out_dir is None:
             return output
         if output is not None:
-            raise UsageError("--out-dir", "is given beside -o", "leave one of them out")
+            raise UsageError("--out-dir", "cannot be combined with -o", "leave one of them out")
         if Path(self.out_dir).exists() and not Path(self.out_dir).is_dir():
-            raise UsageError(f"--out-dir {self.out_dir}", "is no folder", "choose another name")
+            raise UsageError(f"--out-dir {self.out_dir}", "is not a folder", "choose another name")
         return self.out_dir if is_slashed(self.out_dir) else self.out_dir + os.sep
 
     def summaries(self, output: str | None, scans: Sequence[str]) -> list[str]:
-        """Name the files of the summary; none of them if none is wanted.
+        """Return the names of the summary files; empty if no summary is wanted.
 
         Raises
         ------
         UsageError
-            If one is asked for, and there is no folder for it.
+            If a summary is requested and there is no folder for it.
         """
         folder = output if output is not None and is_folder(output) else None
         if self.summary and folder is None:
-            raise UsageError("--summary", "has no folder to go to", "name one by --out-dir")
+            raise UsageError("--summary", "needs a folder for its files", "name one by --out-dir")
         wanted = self.summary if self.summary is not None else len(scans) > 1
         return [] if folder is None or not wanted else [str(Path(folder) / name) for name in (TABLE, LIST)]
 
     def processes(self, scans: Sequence[str]) -> int | None:
-        """Give the number of processes for some scans; None for this process alone."""
+        """Return the number of processes for these scans; None for this process alone."""
         if self.jobs is None or not scans:
             return None
         if self.jobs != AUTO:
@@ -86,12 +86,12 @@ class BatchOptions(NamedTuple):
 
 @contextmanager
 def made_folder(output: str | None) -> Iterator[None]:
-    """Make the folder that the outputs go to, if its name ends in a slash; remove it again if nothing came into it.
+    """Create the output folder if its name ends in a slash; remove it again if it stays empty.
 
     Raises
     ------
     OutputError
-        If it cannot be made.
+        If it cannot be created.
     """
     if output is None or not is_slashed(output) or Path(output).is_dir():
         yield
@@ -101,7 +101,7 @@ def made_folder(output: str | None) -> Iterator[None]:
     except (OSError, ValueError) as error:
         from cylx.io import printable
 
-        fault = f"cannot be made: {(getattr(error, 'strerror', None) or str(error)).lower()}"
+        fault = f"cannot be created: {(getattr(error, 'strerror', None) or str(error)).lower()}"
         raise OutputError(printable(output), fault, "choose another folder") from None
     try:
         yield

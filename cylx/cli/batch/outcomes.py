@@ -1,4 +1,4 @@
-"""What becomes of a scan among many: a record that a process can send, and a line of the summary."""
+"""The outcome of one scan among many: a record that can be sent between processes, and a line of the summary."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Finished:
-    """What is told of a scan whose outputs are written.
+    """The report on a scan whose outputs are written.
 
     Parameters
     ----------
     points, cylinders : int
-        How many there are.
+        Their numbers.
     warnings : sequence of str
-        Those of the result.
+        The warnings of the result.
     profile : dict, optional
-        Its times.
+        The times of the stages.
     """
 
     points: int
@@ -39,22 +39,22 @@ class Finished:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a scan.
+    """The outcome of one scan.
 
     Parameters
     ----------
     status : str
-        `skipped` is what was done before.
+        `skipped` for a scan finished by an earlier run.
     finished : Finished or None
         None if there are no outputs.
     reason : str
-        Why it failed, in a line.
+        Reason of the failure, one line.
     exit_code : int
-        That of this scan alone.
+        The exit code that this scan alone would give.
     peak : int or None
-        Largest memory of its process so far, bytes.
+        Largest memory use of its process so far, bytes.
     trace : str
-        Where it failed, if that is to be shown.
+        The traceback, if it is to be shown.
     """
 
     status: Literal["done", "skipped", "failed"]
@@ -66,7 +66,7 @@ class Outcome:
 
 
 def check_required(job: Job, found: int, required: int | None) -> None:
-    """Refuse to be content with fewer cylinders than required.
+    """Check that at least the required number of cylinders was found.
 
     Raises
     ------
@@ -79,27 +79,27 @@ def check_required(job: Job, found: int, required: int | None) -> None:
 
 
 def failed_outcome(failure: Exception, finished: Finished | None, *, debug: bool) -> Outcome:
-    """Say what became of a scan that failed, with or without its outputs."""
+    """Return the outcome of a scan that failed, with or without outputs."""
     line, code = describe_failure(failure)
     trace = "".join(traceback.format_exception(failure)).rstrip() if debug else ""
     return Outcome("failed", finished, line.removeprefix("cylx: "), code, peak_memory(), trace)
 
 
 def lost_outcome(job: Job, exit_code: int | None) -> Outcome:
-    """Say what became of a scan whose process has died."""
+    """Return the outcome of a scan whose process died."""
     from cylx.io import printable
 
     place = printable(job.scan)
     if exit_code is not None and exit_code == -getattr(signal, "SIGKILL", 9):
-        fault = "its process was killed, as the system does when memory runs out"
+        fault = "its process was killed, probably because memory ran out"
         remedy = "give fewer --jobs, thin the scan, or cut it into parts"
         return Outcome("failed", None, f"{place}: {fault}; {remedy}", UNUSABLE)
-    fault = f"its process ended with {exit_code}, which is a bug of cylx or of a library"
+    fault = f"its process ended with exit code {exit_code}, a bug of cylx or of a library"
     return Outcome("failed", None, f"{place}: {fault}; run it by itself with --debug", BUG)
 
 
 def entry_of(job: Job, outcome: Outcome) -> dict[str, object]:
-    """Write down what became of a scan; what was done before is done."""
+    """Return the entry of a scan in the summary; a scan finished earlier counts as done."""
     finished = outcome.finished
     return {
         "file": legible(job.scan),

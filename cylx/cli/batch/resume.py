@@ -1,4 +1,4 @@
-"""What an earlier run has left: which scans need not be done again, and which files cylx may replace."""
+"""The outputs of an earlier run: which scans are finished, and which files cylx may replace."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ _MOST_HEADER = 1 << 20
 
 
 def finished_before(job: Job, settings: Config, selection: Selection) -> Result | None:
-    """Give the result of a scan if all its outputs are there, from this version, these bytes, points and settings.
+    """Return the earlier result of a scan if all outputs exist and version, input, selection and settings agree.
 
     Parameters
     ----------
     job : Job
         The scan and its outputs.
     settings : Config
-        The configuration, before anything is read off the cloud.
+        The configuration, before null values are derived from the cloud.
     selection : Selection
-        Which points take part.
+        Which points are used.
 
     Returns
     -------
     Result or None
-        None if the scan has to be done.
+        None if the scan has to be processed.
     """
     from cylx.io import read_json, recorded_name, sha256_of
     from cylx.results import Result
@@ -55,10 +55,10 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
 
 
 def is_of_settings(result: Result, settings: Config) -> bool:
-    """Say whether settings amount to the configuration of a result.
+    """Return whether these settings would give the configuration of a result.
 
-    What is read off the cloud follows from its spacing, its noise and its bounds, which the result has. It also says
-    which of the first two were given: those must be given again, and the others left to be measured.
+    Null values are derived from the spacing, the noise and the bounds of the cloud, which the result contains. The
+    result also says whether spacing and noise were given: then the settings must give them again, otherwise not.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def is_of_settings(result: Result, settings: Config) -> bool:
 
 
 def _belong(job: Job, result: Result) -> bool:
-    """Say whether what can be told to be of another result, or another unit, is of this one."""
+    """Return whether the other outputs belong to this result and unit, as far as can be checked."""
     from cylx.cli.batch.meshes import mesh_of
     from cylx.io import read_json
 
@@ -96,7 +96,7 @@ def _belong(job: Job, result: Result) -> bool:
 
 
 def check_own(jobs: Sequence[Job]) -> None:
-    """Refuse outputs that exist and were not written by cylx.
+    """Refuse existing outputs that cylx did not write.
 
     Raises
     ------
@@ -113,7 +113,7 @@ def check_own(jobs: Sequence[Job]) -> None:
 
 
 def is_own_json(name: str) -> bool:
-    """Say whether a file is a JSON object with one of our schemas."""
+    """Return whether a file is a JSON object with one of our schemas."""
     from cylx.io import read_json
 
     try:
@@ -123,7 +123,7 @@ def is_own_json(name: str) -> bool:
 
 
 def _is_own(name: str, job: Job) -> bool:
-    """Say whether cylx wrote an output; of what bears no sign of it, the result beside it tells."""
+    """Return whether cylx wrote an output; files without a mark are judged by the result beside them."""
     if name.endswith(".json") or name == job.result:
         return is_own_json(name)
     if name == job.annotated:

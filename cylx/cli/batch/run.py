@@ -1,4 +1,4 @@
-"""One scan among those of a call of `cylx extract`: read, its cylinders found, written, and told of."""
+"""Process one scan of a call of `cylx extract`: read it, find its cylinders, write and report them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """How the scans of one call of `cylx extract` are done.
+    """How the scans of one call of `cylx extract` are processed.
 
     Parameters
     ----------
@@ -26,13 +26,13 @@ class Run:
     threads : int or None
         Number of threads.
     require : int or None
-        Fewest cylinders in each scan.
+        Minimum number of cylinders in each scan.
     overwrite : bool
-        Whether files that exist may be replaced.
+        Whether existing files may be replaced.
     messages : Messages
-        What is shown.
+        Where messages are shown.
     selection : Selection
-        Which points take part.
+        Which points are used.
     """
 
     settings: Config
@@ -43,7 +43,7 @@ class Run:
     selection: Selection
 
     def extract_one(self, job: Job) -> Finished:
-        """Read a scan, find its cylinders, write them, and say so.
+        """Read a scan, find its cylinders, write them, and report them.
 
         Raises
         ------
@@ -82,11 +82,11 @@ class Run:
 
 
 def attempt(run: Run, debug: bool, job: Job) -> Outcome:
-    """Do a scan and say what became of it; whatever fails is no reason not to do the next one."""
+    """Process a scan and return the outcome; a failure does not stop the other scans."""
     finished = None
     try:
         finished = run.extract_one(job)
         check_required(job, finished.cylinders, run.require)
-    except Exception as failure:  # noqa: BLE001  described, a bug as a bug, with its exit code and its traceback
+    except Exception as failure:  # noqa: BLE001  reported with exit code and traceback; a bug is reported as a bug
         return failed_outcome(failure, finished, debug=debug)
     return Outcome("done", finished, peak=peak_memory())

@@ -1,4 +1,4 @@
-"""Which scans are meant: files as they are, folders, and patterns that no shell has expanded."""
+"""Find the scans: files, folders, and patterns that no shell has expanded."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ from cylx.io.outputs import STREAM
 
 
 def find_scans(names: Sequence[str], *, recursive: bool) -> list[str]:
-    """Put files in the place of folders and patterns; what comes twice is taken once.
+    """Replace folders and patterns by their files; a file that occurs twice is taken once.
 
-    Of a folder these are the files with a suffix that cylx reads, by name. Hidden files are left out, and what cylx has
-    written itself.
+    A folder stands for its files with a suffix that cylx reads, sorted by name. Hidden files and files written by cylx
+    are left out.
 
     Parameters
     ----------
     names : sequence of str
         Files, `-`, folders, and patterns such as `scans/*.ply`.
     recursive : bool
-        Whether the folders in a folder are looked into.
+        Whether subfolders are searched too.
 
     Raises
     ------
     InputError
-        If a folder or a pattern has no scan, or the folder may not be read.
+        If a folder or a pattern has no scan, or the folder cannot be read.
     """
     found: dict[str, str] = {}
     for name in names:
@@ -40,7 +40,7 @@ def find_scans(names: Sequence[str], *, recursive: bool) -> list[str]:
 
 
 def _scans_of(name: str, *, recursive: bool) -> list[str]:
-    """Give the scans that one argument means."""
+    """Return the scans that one argument stands for."""
     if name == STREAM:
         return [name]
     if Path(name).is_dir():
@@ -51,7 +51,7 @@ def _scans_of(name: str, *, recursive: bool) -> list[str]:
 
 
 def _scans_in(folder: str, *, recursive: bool) -> list[str]:
-    """Give the scans in a folder."""
+    """Return the scans in a folder."""
     from cylx.io import cloud_suffix, cloud_suffixes, printable
 
     suffixes = cloud_suffixes()
@@ -59,13 +59,13 @@ def _scans_in(folder: str, *, recursive: bool) -> list[str]:
     scans = [path for path in scans if _is_foreign(path)]
     if not scans:
         where = "in it or below" if recursive else "in it"
-        fault = f"is a folder, and there is nothing to read {where}"
+        fault = f"is a folder with no scan {where}"
         raise InputError(printable(folder), fault, f"give files, or a folder of {' '.join(suffixes)}")
     return scans
 
 
 def _scans_like(pattern: str) -> list[str]:
-    """Give the files that a pattern fits; its suffix says what is read, and if it has none, the suffixes of clouds."""
+    """Return the files that match a pattern: those of its suffix, or of any suffix of clouds if it has none."""
     from cylx.io import cloud_suffix, cloud_suffixes, printable
 
     suffix = Path(pattern).suffix
@@ -75,12 +75,12 @@ def _scans_like(pattern: str) -> list[str]:
     scans = [path for path in files if any_suffix or cloud_suffix(path) in suffixes]
     scans = [path for path in scans if _is_foreign(path)]
     if not scans:
-        raise InputError(printable(pattern), "no file is called like this", "check the pattern and the folder")
+        raise InputError(printable(pattern), "no file matches", "check the pattern and the folder")
     return scans
 
 
 def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
-    """Give the files in a folder by name, then those of its folders; hidden ones and links to folders are left out."""
+    """Yield the files of a folder by name, then those of its subfolders, without hidden files and links to folders."""
 
     def refuse(error: OSError) -> NoReturn:
         from cylx.io import printable
@@ -97,6 +97,6 @@ def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
 
 
 def _is_foreign(path: str) -> bool:
-    """Say whether cylx has not written a file that could be taken for a scan."""
+    """Return whether a file that looks like a scan was not written by cylx."""
     name = Path(path).name
     return Path(name).stem[-len(ANNOTATED) :] != ANNOTATED and not (name == TABLE and is_own_table(path))

@@ -1,6 +1,6 @@
-"""What came out of many scans, as one table of cylinders and one list of files: `summary.csv` and `summary.json`.
+"""The summary of many scans: one table of cylinders and one list of files, `summary.csv` and `summary.json`.
 
-Neither holds times or tells what was done in which run: the same scans and settings give the same bytes.
+They hold neither times nor which run processed a scan: the same scans and settings give the same bytes.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ _PLAIN = re.compile(r"[A-Za-z0-9_./\\:+-][A-Za-z0-9_./\\: +-]*")
 
 
 def table_text(results: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
-    r"""Write the table: a line of names, and a line a cylinder.
+    r"""Format the table: a header line, and one line per cylinder.
 
-    Lines end in LF. Texts with anything but letters, digits and `_./\:+-` are quoted, quotes in them doubled. What a
-    cylinder does not have is empty.
+    Lines end in LF. Texts are quoted, with quotes doubled, if they hold anything but letters, digits and `_./\:+-`.
+    Values that a cylinder does not have are empty.
 
     Parameters
     ----------
     results : sequence of (str, mapping)
-        Files, and the objects of their JSON.
+        Files, and their parsed JSON.
     """
     header = ",".join(COLUMNS) + "\n"
     return header + "".join(line for file, result in results for line in _lines(file, result))
 
 
 def list_text(files: Sequence[Mapping[str, object]]) -> str:
-    """Write the list of files, each as a JSON object."""
+    """Format the list of files, each as a JSON object."""
     from cylx.results.parts import text_of
     from cylx.version import __version__
 
@@ -53,12 +53,12 @@ def list_text(files: Sequence[Mapping[str, object]]) -> str:
 
 
 def legible(name: str) -> str:
-    r"""Give the name of a file in characters that UTF-8 has; a byte that is none becomes `\xff`."""
+    r"""Return a file name in valid UTF-8; an undecodable byte becomes `\xff`."""
     return os.fsencode(name).decode("utf-8", "backslashreplace")
 
 
 def is_own_table(path: str) -> bool:
-    """Say whether a file begins as the table does."""
+    """Return whether a file begins with the header of the table."""
     start = ",".join(COLUMNS[:4]).encode()
     try:
         with Path(path).open("rb") as file:

@@ -1,7 +1,7 @@
-"""Processes that work on one thing each, started as memory allows; one that is killed takes its thing with it alone.
+"""Worker processes with one task each, started as memory allows; if one is killed, only its task is lost.
 
-They are spawned, not forked, and see nothing of Ctrl-C: whoever started them ends them, and if that one dies,
-they end, too.
+They are spawned, not forked, and do not receive Ctrl-C. The parent ends them; if the parent dies, they end by
+themselves.
 """
 
 from __future__ import annotations
@@ -23,35 +23,35 @@ Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 _GLANCE = 1.0
-"""Seconds after which memory is looked at again."""
+"""Seconds between two checks of the memory."""
 _GRACE = 10.0
-"""Seconds that a process has to leave by itself."""
+"""Seconds that a process has to end by itself."""
 _TERMINATED = 128 + 15
 
 
 class Lost(NamedTuple):
-    """What there is instead of an answer if a process has died.
+    """The answer of a process that died.
 
     Parameters
     ----------
     exit_code : int or None
-        Of the process; a signal that killed it is negative.
+        Exit code of the process; negative for the signal that killed it.
     """
 
     exit_code: int | None
 
 
 class Workers(Generic[Task, Answer]):
-    """Some processes, and what they are told to do.
+    """A pool of processes.
 
     Parameters
     ----------
     work : callable
-        What is done with each task, in a process; it is pickled.
+        Called with each task in a process; it is pickled.
     most : int
-        Number of processes.
+        Maximum number of processes.
     after_death : callable
-        Is told the id of each process that died or had to be killed.
+        Called with the id of each process that died or had to be killed.
     """
 
     def __init__(self, work: Callable[[Task], Answer], most: int, after_death: Callable[[int], None]) -> None:
@@ -62,7 +62,7 @@ class Workers(Generic[Task, Answer]):
         self._busy: dict[int, _Worker] = {}
 
     def run(self, tasks: Sequence[Task], needs: Sequence[int]) -> Generator[tuple[int, Answer | Lost], None, None]:
-        """Work on all tasks; they are started in their order.
+        """Run all tasks; they are started in their order.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Workers(Generic[Task, Answer]):
         Yields
         ------
         index : int
-            Of the task that is done.
+            Index of the finished task.
         answer : object or Lost
         """
         waiting = deque(range(len(tasks)))
@@ -90,7 +90,7 @@ class Workers(Generic[Task, Answer]):
             self._end()
 
     def _fits(self, index: int, needs: Sequence[int]) -> bool:
-        """Say whether there is memory for another task beside those that are worked on; the first has no choice."""
+        """Return whether memory allows another task beside the running ones; the first task always starts."""
         available = free_memory() if self._busy else None
         if available is None:
             return True
@@ -98,22 +98,22 @@ class Workers(Generic[Task, Answer]):
         return sum(needs[busy] for busy in self._busy) + needs[index] <= available + ours
 
     def _give(self, task: Task) -> _Worker:
-        """Hand a task to a process that is idle, or to a new one."""
+        """Send a task to an idle process, or to a new one."""
         while self._idle:
             worker = self._idle.pop()
             try:
                 worker.pipe.send(task)
-            except OSError:  # it died since
+            except OSError:  # it died in the meantime
                 self._part(worker)
             else:
                 return worker
         worker = _Worker(self.work)
-        with suppress(OSError):  # if it is dead already, nothing is heard of it
+        with suppress(OSError):  # a dead process shows when its answer is read
             worker.pipe.send(task)
         return worker
 
     def _take(self, index: int) -> Answer | Lost:
-        """Hear what became of a task."""
+        """Receive the answer to a task."""
         worker = self._busy.pop(index)
         try:
             answer: Answer = worker.pipe.recv()
@@ -124,7 +124,7 @@ class Workers(Generic[Task, Answer]):
         return answer
 
     def _end(self) -> None:
-        """End all processes: those that work are told to stop, and killed if they do not."""
+        """End all processes: ask the busy ones to stop, and kill those that do not."""
         for worker in self._busy.values():
             worker.process.terminate()
         for worker in (*self._busy.values(), *self._idle):
@@ -150,19 +150,19 @@ class _Worker:
         self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
         with _ctrl_c_kept_back():
             self.process.start()
-        theirs.close()  # so that the end of the process is the end of the pipe
+        theirs.close()  # so that the pipe closes when the process ends
         self.pid = self.process.pid or 0
 
 
 @contextmanager
 def _ctrl_c_kept_back() -> Iterator[None]:
-    """Keep Ctrl-C from a process that is started meanwhile; this one hears of it afterwards."""
+    """Block Ctrl-C for a process started meanwhile; this process receives it afterwards."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
     from multiprocessing import resource_tracker
 
-    resource_tracker.ensure_running()  # it would let Ctrl-C through if started below
+    resource_tracker.ensure_running()  # started inside the block, it would unblock Ctrl-C
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -171,7 +171,7 @@ def _ctrl_c_kept_back() -> Iterator[None]:
 
 
 def _serve(pipe: Connection, work: Callable[[Task], Answer]) -> None:
-    """Do what comes through the pipe, until it ends."""
+    """Run the tasks that come through the pipe until it is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _leave)
     threading.Thread(target=_follow_parent, daemon=True).start()
@@ -186,12 +186,12 @@ def _serve(pipe: Connection, work: Callable[[Task], Answer]) -> None:
 
 
 def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """Leave by the way on which temporary files are removed."""
+    """Exit in a way that removes temporary files."""
     raise SystemExit(_TERMINATED)
 
 
 def _follow_parent() -> None:
-    """End this process when the one that started it has ended."""
+    """End this process when its parent has ended."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         parent.join()

@@ -1,1 +1,1 @@
-"""What several commands ask for, one file a kind of option."""
+"""Options shared by several commands, one file per kind of option."""

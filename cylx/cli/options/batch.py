@@ -1,4 +1,4 @@
-"""The options of `cylx extract` that are about many scans at once."""
+"""The options of `cylx extract` about many scans."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ else:
 
 
 class Processes(NumberType):
-    """A number of processes, 0 and `auto` being as many as there is room for."""
+    """A number of processes; 0 and `auto` mean as many as cores and memory allow."""
 
     name = "n"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Read the number."""
+        """Parse the number."""
         if value == "auto":
             return AUTO
         try:
@@ -31,12 +31,12 @@ class Processes(NumberType):
         except ValueError:
             number = -1
         if number < 0:
-            self.fail(f"'{value}' is no number of processes, nor auto", param, ctx)
+            self.fail(f"'{value}' is not a number of processes or auto", param, ctx)
         return number
 
 
 def with_batch_options(command: Command) -> Command:
-    """Add the options about many scans; the command gets `options`."""
+    """Add the options about many scans; the command receives `options`."""
 
     @functools.wraps(command)
     def with_options(
@@ -60,22 +60,20 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
         "--out-dir",
         metavar="FOLDER",
         shell_complete=complete_files,
-        help="Folder for all outputs; it is made if it is not there.",
+        help="Folder for all outputs; it is created if it does not exist.",
     ),
-    click.option("--recursive", is_flag=True, help="Look into the folders in a folder, too."),
+    click.option("--recursive", is_flag=True, help="Search subfolders too."),
     click.option(
         "--jobs",
         type=Processes(),
         metavar="N",
-        help="Processes that take a scan each; 0 or auto: as many as cores and memory allow."
+        help="Number of processes, with one scan at a time in each; 0 or auto: as many as cores and memory allow."
         "  [default: one scan after the other in this process]",
     ),
-    click.option(
-        "--resume", is_flag=True, help="Leave out what is done and unchanged; do the rest, and what is stale."
-    ),
+    click.option("--resume", is_flag=True, help="Skip scans that are finished and unchanged; process the others."),
     click.option(
         "--summary/--no-summary",
         default=None,
-        help="Write summary.csv and summary.json into the folder.  [default: yes, of several scans]",
+        help="Write summary.csv and summary.json into the folder.  [default: yes, for several scans]",
     ),
 )

@@ -1,6 +1,6 @@
-"""The options that several commands share, one function each.
+"""Options shared by several commands, one function each.
 
-| function | options | the command gets |
+| function | options | the command receives |
 |---|---|---|
 | `configured` | `-c/--config --method --preset --set --seed`, and limits: `--radius` … | `settings`, a `Config` |
 | `with_messages` | `-q/--quiet -v/--verbose` | `messages`, a `Messages` |
@@ -40,12 +40,12 @@ else:
 
 
 class RadiusRange(BoundsType):
-    """`MIN:MAX`, either side may be empty."""
+    """`MIN:MAX`; either side may be empty."""
 
     name = "min:max"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Bounds:
-        """Read the two radii."""
+        """Parse the two radii."""
         if isinstance(value, tuple):
             return value
         sides = str(value).split(":")
@@ -57,7 +57,7 @@ class RadiusRange(BoundsType):
         return low, high
 
     def _radius(self, side: str, param: click.Parameter | None, ctx: click.Context | None) -> float | None:
-        """Read one radius, None for an empty side."""
+        """Parse one radius; None for an empty side."""
         if not side.strip():
             return None
         try:
@@ -75,7 +75,7 @@ class KnownRadius(KnownType):
     name = "r[:sd]"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Known:
-        """Read the radius and its standard deviation."""
+        """Parse the radius and its standard deviation."""
         if isinstance(value, tuple):
             return value
         try:
@@ -83,7 +83,7 @@ class KnownRadius(KnownType):
         except ValueError:
             numbers = []
         if len(numbers) not in {1, 2} or not all(0 < number < float("inf") for number in numbers):
-            self.fail(f"'{value}' is not R or R:SD in positive numbers, such as 0.05 or 0.05:0.001", param, ctx)
+            self.fail(f"'{value}' is not R or R:SD with positive numbers, such as 0.05 or 0.05:0.001", param, ctx)
         return numbers[0], numbers[1] if len(numbers) == 2 else None
 
 
@@ -94,7 +94,7 @@ class Vector(VectorType):
     example = "100,200,0"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """Read the three numbers."""
+        """Parse the three numbers."""
         if isinstance(value, tuple):
             return value
         try:
@@ -109,27 +109,27 @@ class Vector(VectorType):
 class Axis(Vector):
     """`X,Y,Z` as a direction, or the name of a coordinate axis."""
 
-    example = "0,0,1, and not x, y or z"
+    example = "0,0,1, nor x, y or z"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:
-        """Read the three numbers, or the name."""
+        """Parse the three numbers, or the name."""
         if value in ("x", "y", "z"):
             return tuple(float(name == value) for name in "xyz")
         axis = super().convert(value, param, ctx)
         if not (any(axis) and all(map(isfinite, axis))):
-            self.fail(f"'{value}' is no direction; the numbers must be finite, and one of them not 0", param, ctx)
+            self.fail(f"'{value}' is not a direction; the numbers must be finite and not all 0", param, ctx)
         return axis
 
 
 def complete_files(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-    """Tell the shell to complete a file name."""
+    """Return the instruction to the shell to complete a file name."""
     from click.shell_completion import CompletionItem
 
     return [CompletionItem(incomplete, type="file")]
 
 
 def configured(command: Command) -> Command:
-    """Add the options of the configuration; the command gets `settings`."""
+    """Add the options of the configuration; the command receives `settings`."""
 
     @functools.wraps(command)
     def with_settings(
@@ -162,62 +162,62 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--method",
         type=click.Choice(METHODS),
-        help="How cylinders are found: by the clustering game, or by a method that the paper compares it with."
+        help="Method that finds the cylinders: the clustering game, or one that the paper compares it with."
         "  [default: gt]",
     ),
     click.option(
         "--preset",
         type=click.Choice(PRESETS),
-        help="Where the settings start from: the best there is, or the paper to the letter. The values in the file of"
-        " --config go over it.  [default: auto]",
+        help="Default settings: the best there are, or those of the paper to the letter. The values in the --config"
+        " file override them.  [default: auto]",
     ),
     click.option(
         "--set", "overrides", metavar="KEY=VALUE", multiple=True, help="Set one key, as in slicing.planes=80."
     ),
-    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Seed of everything random.  [default: 0]"),
+    click.option("--seed", type=click.IntRange(min=0), metavar="N", help="Random seed.  [default: 0]"),
     click.option("--radius", type=RadiusRange(), help="Smallest and largest radius, in the unit of the scan."),
     click.option(
-        "--axis", type=Axis(), help="Direction of the cylinders, either way, or just x, y or z.  [default: any]"
+        "--axis", type=Axis(), help="Direction of the cylinders, up to sign, or just x, y or z.  [default: any]"
     ),
     click.option(
         "--axis-tolerance",
         "axis_tolerance_deg",
         type=click.FloatRange(0, 90, min_open=True),
         metavar="DEG",
-        help="Largest angle of a cylinder to --axis, degrees.  [default: 10]",
+        help="Largest angle between a cylinder and --axis, degrees.  [default: 10]",
     ),
     click.option(
         "--axis-sd",
         "axis_sd_deg",
         type=click.FloatRange(0, 90, min_open=True),
         metavar="DEG",
-        help="Draw the directions to --axis, from which they are known to tilt by about so many degrees.",
+        help="Standard deviation of the cylinders' tilts from --axis, degrees: a prior for each fit.",
     ),
     click.option(
         "--known-radius",
         type=KnownRadius(),
-        help="Draw the radii to this one, known with a standard deviation SD.  [default: SD a thousandth]",
+        help="Known radius and its standard deviation: a prior for each fit.  [default: SD a thousandth]",
     ),
     click.option(
         "--catalogue",
         metavar="FILE",
         shell_complete=complete_files,
-        help="Draw each radius to the one in this CSV or YAML file of nominal radii that the points bear out.",
+        help="CSV or YAML file of nominal radii; the one that the points support becomes the prior of a fit.",
     ),
     click.option(
         "--min-coverage",
         "min_coverage_deg",
         type=click.FloatRange(0, 360),
         metavar="DEG",
-        help="Smallest angle about its axis that must be seen of a cylinder, degrees.  [default: 20]",
+        help="Smallest angle of the surface that must be seen, about the axis, degrees.  [default: 20]",
     ),
-    click.option("--max-cylinders", type=click.IntRange(min=1), metavar="N", help="Give at most so many cylinders."),
+    click.option("--max-cylinders", type=click.IntRange(min=1), metavar="N", help="Maximum number of cylinders."),
     click.option("--planes", type=click.IntRange(min=0), metavar="N", help="Number of planes through the whole cloud."),
 )
 
 
 def with_messages(command: Command) -> Command:
-    """Add `-q` and `-v`; the command gets `messages`."""
+    """Add `-q` and `-v`; the command receives `messages`."""
 
     @functools.wraps(command)
     def with_talk(*args: object, quiet: bool, verbose: bool, **others: object) -> object:
@@ -225,23 +225,23 @@ def with_messages(command: Command) -> Command:
 
         return command(*args, messages=Messages(quiet=quiet, verbose=verbose and not quiet), **others)
 
-    verbose = click.option("-v", "--verbose", is_flag=True, help="Say what each stage kept and dropped, and why.")
-    quiet = click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    verbose = click.option("-v", "--verbose", is_flag=True, help="Show what each stage kept and rejected, and why.")
+    quiet = click.option("-q", "--quiet", is_flag=True, help="Show errors only.")
     return quiet(verbose(with_talk))  # type: ignore[return-value]  # click keeps the signature
 
 
 def overwrite_option(command: Command) -> Command:
     """Add `--overwrite`."""
-    return click.option("--overwrite", is_flag=True, help="Replace output files that exist.")(command)
+    return click.option("--overwrite", is_flag=True, help="Replace existing output files.")(command)
 
 
 def json_option(command: Command) -> Command:
-    """Add `--json`; the command gets `as_json`."""
-    return click.option("--json", "as_json", is_flag=True, help="Answer in JSON.")(command)
+    """Add `--json`; the command receives `as_json`."""
+    return click.option("--json", "as_json", is_flag=True, help="Print the answer as JSON.")(command)
 
 
 def debug_option(command: Command) -> Command:
-    """Add `--debug`, which makes every failure show its traceback."""
+    """Add `--debug`, which shows the traceback of every failure."""
 
     def remember(ctx: click.Context, _: click.Parameter, debug: bool) -> None:
         ctx.meta[DEBUG] = debug or ctx.meta.get(DEBUG, False)

@@ -1,4 +1,4 @@
-"""The options that leave points out, for a first look or for good."""
+"""The options that select the points to use."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ else:
 
 
 class CropBox(BoxType):
-    """`X0,Y0,Z0:X1,Y1,Z1`, any of the numbers, and either corner, may be empty."""
+    """`X0,Y0,Z0:X1,Y1,Z1`; any number, and either corner, may be empty."""
 
     name = "x0,y0,z0:x1,y1,z1"
     example = "0,0,0:5,5,3, or ,,0:,,3 for z alone"
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Box:
-        """Read the two corners."""
+        """Parse the two corners."""
         if isinstance(value, tuple):
             return value
         text = str(value)
@@ -48,7 +48,7 @@ class CropBox(BoxType):
         return low, high
 
     def _corner(self, text: str) -> Corner:
-        """Read three coordinates, None for one that is empty."""
+        """Parse three coordinates; None for an empty one."""
         sides = text.split(",") if text.strip() else ["", "", ""]
         x, y, z = (float(side) if side.strip() else None for side in sides)
         if not all(side is None or isfinite(side) for side in (x, y, z)):
@@ -62,17 +62,17 @@ class Classes(ClassesType):
     name = "n,..."
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, ...]:
-        """Read the numbers."""
+        """Parse the numbers."""
         if isinstance(value, tuple):
             return value
         parts = str(value).split(",")
         if not all(part.strip().isascii() and part.strip().isdecimal() for part in parts):
-            self.fail(f"'{value}' is not made of numbers of classes such as 2,6", param, ctx)
+            self.fail(f"'{value}' is not a list of class numbers such as 2,6", param, ctx)
         return tuple(int(part) for part in parts)
 
 
 def selecting(command: Command) -> Command:
-    """Add the options that leave points out; the command gets `selection`."""
+    """Add the options that select points; the command receives `selection`."""
 
     @functools.wraps(command)
     def with_selection(
@@ -98,30 +98,30 @@ _SELECTION: tuple[Callable[[Any], Any], ...] = (
     click.option(
         "--crop",
         type=CropBox(),
-        help="Only points in this box take part, its sides included; what is left empty sets no bound, as in ,,0:,,3.",
+        help="Use only points in this box, sides included; an empty number sets no bound, as in ,,0:,,3.",
     ),
     click.option(
         "--voxel",
         type=click.FloatRange(0, float("inf"), min_open=True, max_open=True),
         metavar="SIZE",
-        help="Only one point takes part in each cell of this side: the one nearest to its middle.",
+        help="Use only one point in each cell of this side length: the one nearest to the middle.",
     ),
     click.option(
         "--every",
         type=click.IntRange(min=1),
         metavar="N",
-        help="Only the first of every N rows of the scan takes part.",
+        help="Use only the first of every N rows of the scan.",
     ),
     click.option(
         "--classes",
         type=Classes(),
-        help="Only points of these classes take part, such as 2,6; for scans with a classification, as LAS has it.",
+        help="Use only points of these classes, such as 2,6; for scans with a classification, as LAS has it.",
     ),
     click.option(
         "--scan",
         "scan_number",
         type=click.IntRange(min=0),
         metavar="N",
-        help="Read one scan of an E57 file, the first is 0.  [default: all]",
+        help="Read one scan of an E57 file; the first is 0.  [default: all]",
     ),
 )

@@ -12,5 +12,5 @@ UNITS = ("m", "mm", "cm", "in", "ft")
 
 
 def units_option(which: str) -> Callable[[Command], Command]:
-    """Make the option `--units`; `which` says what needs it."""
+    """Return the option `--units`; `which` says which outputs need it."""
     return click.option("--units", type=click.Choice(UNITS), help=f"Unit of the scan; {which} it.")

@@ -1,1 +1,1 @@
-"""What a person sees: tables, progress, help and failures."""
+"""What the user sees: tables, progress, help and failures."""

@@ -1,4 +1,4 @@
-"""What is shown on the way and at the end: the only room with rich."""
+"""Progress and tables on the terminal; the only module that uses rich."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _COMPILING = "compiling (the first time only)"
 
 
 class Messages:
-    """All that a command says on standard error, apart from errors.
+    """The messages of a command on standard error, apart from errors.
 
     Parameters
     ----------
     quiet : bool
-        Say nothing.
+        Show nothing.
     verbose : bool
-        Say more.
+        Show more.
     """
 
     def __init__(self, *, quiet: bool = False, verbose: bool = False) -> None:
@@ -35,13 +35,13 @@ class Messages:
         self.verbose = verbose
 
     def say(self, line: str) -> None:
-        """Say a line, unless quiet."""
+        """Print a line, unless quiet."""
         if not self.quiet:
             tell(line)
 
     @contextmanager
     def progress(self) -> Iterator[Observer]:
-        """Give an observer that shows how far the stages are, where somebody can see it."""
+        """Yield an observer that shows the progress of the stages, if standard error is a terminal."""
         if self.quiet or not sys.stderr.isatty():
             yield SilentObserver()
             return
@@ -53,7 +53,7 @@ class Messages:
 
     @contextmanager
     def counting(self, total: int) -> Iterator[Callable[[], None]]:
-        """Give what is called after each of many scans; a bar and the time that is left, where somebody can see it."""
+        """Yield a function to call after each of many scans; a terminal shows a bar and the remaining time."""
         if self.quiet or not sys.stderr.isatty():
             yield lambda: None
             return
@@ -66,12 +66,12 @@ class Messages:
 
 
 class ProgressObserver:
-    """An observer that keeps one line of a rich display up to date.
+    """An observer that updates one line of a rich display.
 
     Parameters
     ----------
     display : rich.progress.Progress
-        Where the line is.
+        The display of the line.
     """
 
     def __init__(self, display: Progress) -> None:
@@ -82,7 +82,7 @@ class ProgressObserver:
         self.total: int | None = None
 
     def stage_started(self, name: str, total: int | None) -> None:
-        """Show a stage in the place of the one before."""
+        """Show a stage in place of the previous one."""
         if self.task is not None:
             self.display.remove_task(self.task)
         self.name, self.total = name, total
@@ -103,33 +103,33 @@ class ProgressObserver:
         return f"{done}/{self.total}" if done else ""
 
     def stage_finished(self, name: str, seconds: float) -> None:
-        """Leave the line until the next stage starts."""
+        """Keep the line until the next stage starts."""
 
 
 class Observers:
-    """Several observers who are told the same.
+    """An observer that forwards to several observers.
 
     Parameters
     ----------
     *observers : Observer
-        Who is told.
+        Who receives the calls.
     """
 
     def __init__(self, *observers: Observer) -> None:
         self.observers = observers
 
     def stage_started(self, name: str, total: int | None) -> None:
-        """Tell all."""
+        """Forward to all observers."""
         for observer in self.observers:
             observer.stage_started(name, total)
 
     def stage_advanced(self, steps: int) -> None:
-        """Tell all."""
+        """Forward to all observers."""
         for observer in self.observers:
             observer.stage_advanced(steps)
 
     def stage_finished(self, name: str, seconds: float) -> None:
-        """Tell all."""
+        """Forward to all observers."""
         for observer in self.observers:
             observer.stage_finished(name, seconds)
 
@@ -144,7 +144,7 @@ def observed(observer: Observer, name: str, total: int | None = None) -> Iterato
 
 
 def show_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, err: bool = False) -> None:
-    """Show a table on standard output, or on standard error; numbers to the right."""
+    """Print a table on standard output or standard error, with numbers aligned to the right."""
     from rich import box
     from rich.table import Table
     from rich.text import Text
@@ -166,9 +166,9 @@ def show_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, err: boo
 
 
 def _console(stream: object) -> Console:
-    """Open a console on a stream; where nobody looks, lines are as wide as they have to be."""
+    """Open a console on a stream; if it is not a terminal, lines are not wrapped."""
     from rich.console import Console
 
-    console = Console(file=stream, soft_wrap=False)  # type: ignore[arg-type]  # click may have put its own stream there
+    console = Console(file=stream, soft_wrap=False)  # type: ignore[arg-type]  # click may have replaced the stream
     console.width = max(console.width, _NARROWEST) if console.is_terminal else _WIDE_ENOUGH
     return console

@@ -1,4 +1,4 @@
-"""What becomes of a failure: one line on standard error and an exit code, and a traceback only with `--debug`."""
+"""Failures: one line on standard error and an exit code; a traceback only with `--debug`."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ _PASSED_ON = (click.exceptions.Exit, SystemExit, GeneratorExit)
 
 
 class Failures:
-    """Within it, a failure ends the program with one line and its exit code.
+    """A context in which a failure ends the program with one line and its exit code.
 
     Parameters
     ----------
     context : click.Context, optional
-        Knows whether `--debug` was given.
+        The context that holds the value of `--debug`.
     """
 
     def __init__(self, context: click.Context | None = None) -> None:
@@ -55,17 +55,17 @@ class Failures:
 
 
 def describe_failure(failure: BaseException) -> tuple[str, int]:
-    """Give the line and the exit code of a failure.
+    """Return the line and the exit code of a failure.
 
     Parameters
     ----------
     failure : BaseException
-        What was raised.
+        The exception.
 
     Returns
     -------
     line : str
-        Empty if there is nothing to say.
+        Empty if there is nothing to print.
     code : int
         The exit code.
     """
@@ -84,7 +84,7 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
 
 
 def tell(line: str) -> None:
-    """Say something on standard error; nobody listening is no failure."""
+    """Print a line on standard error; ignore it if standard error is closed."""
     with contextlib.suppress(OSError):
         click.echo(line, err=True)
 
@@ -97,7 +97,7 @@ def answer(text: str) -> None:
     OutputError
         If it cannot be written.
     BrokenPipeError
-        If the reader has gone.
+        If the reader of the pipe has closed it.
     """
     if sys.stdout is None:
         raise OutputError("standard output", "is closed", "open it, or write to a file")
@@ -112,12 +112,12 @@ def answer(text: str) -> None:
 
 @contextmanager
 def called_by_file(files: Mapping[str, str]) -> Iterator[None]:
-    """Let errors about a document name its file.
+    """Replace the name of a document by its file name in errors.
 
     Parameters
     ----------
     files : mapping of str to str
-        What the library calls the document, and its file.
+        Name of the document in the library, and its file.
     """
     try:
         yield
@@ -130,30 +130,30 @@ def called_by_file(files: Mapping[str, str]) -> Iterator[None]:
 
 
 def flush_answer() -> BrokenPipeError | OutputError | None:
-    """Write what is still in the buffer of standard output, and return what went wrong."""
+    """Flush the buffer of standard output, and return the error if that fails."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
     except OSError as error:
-        with contextlib.suppress(io.UnsupportedOperation):  # so that the interpreter does not fail on it once more
+        with contextlib.suppress(io.UnsupportedOperation):  # so that the interpreter does not fail on it again
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return error if isinstance(error, BrokenPipeError) else _unwritten(error)
     return None
 
 
 def _raised_by_click(trace: TracebackType | None) -> bool:
-    """Say whether it was click that failed to write, its help or version, which goes to standard output."""
+    """Return whether click failed to write its help or version to standard output."""
     frames = [frame for frame, _ in traceback.walk_tb(trace)]
     return bool(frames) and frames[-1].f_globals.get("__name__") == "click.utils"
 
 
 def _unwritten(error: OSError) -> OutputError:
-    """Say why standard output could not be written."""
+    """Return the error for standard output that cannot be written."""
     return OutputError("standard output", f"cannot be written: {error.strerror}", "free some space, or write to a file")
 
 
 def _usage_line(failure: click.ClickException) -> str:
-    """Turn click's report of a usage error into one line."""
+    """Return click's usage error as one line."""
     context = getattr(failure, "ctx", None)
     if isinstance(failure, getattr(click.exceptions, "NoArgsIsHelpError", ())):
         return failure.format_message()
@@ -162,5 +162,5 @@ def _usage_line(failure: click.ClickException) -> str:
 
 
 def _one_line(text: str) -> str:
-    """Join the lines of a text, and show what a terminal would not print."""
+    """Join the lines of a text, and escape characters that a terminal would not print."""
     return "".join(c if c.isprintable() else " " for c in " ".join(text.split()))

@@ -1,4 +1,4 @@
-"""Commands whose help leads with examples, and the group that imports them when they are asked for."""
+"""Commands whose help starts with examples, and a group that imports commands on demand."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from cylx.cli.terminal.failures import Failures
 
 
 class ExampleCommand(click.Command):
-    """A command whose help leads with examples.
+    """A command whose help starts with examples.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class ExampleCommand(click.Command):
         self.examples = examples
 
     def format_help_text(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the examples, and what the command does."""
+        """Write the examples and the description of the command."""
         if self.examples:
             with formatter.section("Examples"):
                 for line in self.examples:
@@ -35,18 +35,18 @@ class ExampleCommand(click.Command):
 
 
 class ExampleGroup(ExampleCommand, click.Group):
-    """A group whose help leads with examples, and whose commands' help does."""
+    """A group whose help and whose commands' help start with examples."""
 
     command_class = ExampleCommand
 
 
 class LazyGroup(ExampleGroup):
-    """A group that knows the homes of its commands, and turns failures into one line and an exit code.
+    """A group that imports its commands on demand, and turns failures into one line and an exit code.
 
     Parameters
     ----------
     homes : mapping of str to str
-        Command to the module that holds it under the same name.
+        Command name to the module that defines the command.
     """
 
     def __init__(self, *args: Any, homes: Mapping[str, str], **attributes: Any) -> None:  # noqa: ANN401  the signature is click's
@@ -54,7 +54,7 @@ class LazyGroup(ExampleGroup):
         self.homes = homes
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Name the commands, in the order of their use."""
+        """Return the names of the commands, in the order of use."""
         return list(self.homes)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -68,7 +68,7 @@ class LazyGroup(ExampleGroup):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find the command, or name the one that was probably meant."""
+        """Find the command, or suggest the one with the closest name."""
         name = args[0]
         if name not in self.homes and not name.startswith("-"):
             close = get_close_matches(name, self.homes, n=1)

@@ -1,4 +1,4 @@
-"""A quick start and end: nothing is imported that is not needed, and garbage is collected when there is some."""
+"""Fast start and exit: skip imports that are not needed, and run the garbage collector rarely."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ BLAS = "scipy.linalg.cython_blas"
 
 
 def import_numba_without_blas() -> None:
-    """Import the part of Numba that looks for BLAS, with BLAS out of sight.
+    """Import the part of Numba that looks for BLAS while hiding BLAS from it.
 
-    It would import all of scipy.linalg for it, which takes longer than reading a cloud. No kernel of cylx multiplies
-    matrices. Those of a program that imports cylx may, so that only the command line does this: its process is its own.
+    Numba would import all of scipy.linalg for BLAS, which takes longer than reading a cloud. The kernels of cylx do not
+    multiply matrices. A program that imports cylx may, so only the command line hides BLAS, in its own process.
     """
     if BLAS in sys.modules or "numba.np.arraymath" in sys.modules:
         return
-    sys.modules[BLAS] = None  # type: ignore[assignment]  # what the import system takes for "not to be found"
+    sys.modules[BLAS] = None  # type: ignore[assignment]  # the import system treats None as "not found"
     try:
         import_module("numba.np.arraymath")
     finally:
@@ -28,19 +28,19 @@ def import_numba_without_blas() -> None:
 
 
 def collect_rarely() -> None:
-    """Let the garbage collector wait: imports make half a million objects, which all stay, and it looks at each often.
+    """Run the garbage collector rarely: imports make half a million permanent objects, which it scans again and again.
 
-    Arrays are freed without it, when the last that holds them lets go.
+    Arrays do not need it: reference counting frees them.
     """
     gc.set_threshold(100_000, 50, 100)
 
 
 @contextmanager
 def own_process() -> Iterator[None]:
-    """Do without what only long-lived processes need: garbage collected early and at the end, and plug-ins.
+    """Switch off features for long-lived processes: early and final garbage collection, and plug-ins.
 
-    Pydantic asks the metadata of everything that is installed for plug-ins, and the interpreter looks for garbage once
-    more before it ends: a tenth of a second each.
+    Pydantic searches the metadata of all installed packages for plug-ins, and the interpreter collects garbage once
+    more at exit; each takes a tenth of a second.
     """
     collect_rarely()
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")

@@ -1,4 +1,4 @@
-"""How long the stages of a run took and how much memory it needed, for `--profile`."""
+"""Seconds per stage and peak memory of a run, for `--profile`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Stopwatch:
         self._started = perf_counter()
 
     def stage_started(self, name: str, total: int | None) -> None:
-        """Put the stage on the list."""
+        """Add the stage to the list."""
         self.stages.setdefault(name, 0.0)
 
     def stage_advanced(self, steps: int) -> None:
@@ -32,7 +32,7 @@ class Stopwatch:
         self.stages[name] = self.stages.get(name, 0.0) + seconds
 
     def report(self, points: int, cylinders: int) -> dict[str, object]:
-        """Give the times of the scan as a JSON object; `seconds` is from the start until now."""
+        """Return the times of the scan as a JSON object; `seconds` counts from the start until now."""
         return {
             "file": self.scan,
             "points": points,
@@ -43,7 +43,7 @@ class Stopwatch:
 
 
 def peak_memory() -> int | None:
-    """Give the largest resident memory of this process so far, bytes; None where the system does not tell."""
+    """Return the largest resident memory of this process so far, bytes; None if the system does not report it."""
     try:
         import resource
     except ModuleNotFoundError:
