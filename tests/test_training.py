@@ -15,7 +15,7 @@ from cylx.geometry.cylinder import Cylinder, cylinder_coordinates
 from cylx.synthetic import OTHER_SURFACE
 from cylx.synthetic.surfaces import Box, Mantle, Sphere, Wall
 
-sys.path.insert(0, str(Path(__file__).parent / "benchmarks" / "evidence"))
+sys.path.insert(0, str(Path(__file__).parent / "training"))
 
 import ablation
 import collect
@@ -178,6 +178,12 @@ def shifted(radius=0.5, aside=0.0, along=0.0, tilt=0.0):
     return Cylinder(PIPE.point + np.array([0, aside, along]), direction, radius, 1.0)
 
 
+def truth_of(*, ignore=False):
+    """Write the truth of a scene with one pipe."""
+    true = drafts.TrueCylinder(PIPE, 1000, 360.0, ignore)
+    return drafts.SyntheticScene(np.zeros((0, 3)), np.zeros(0, np.int32), (true,), 0.0, "pipe", 0, {}).truth()
+
+
 @pytest.mark.parametrize(
     ("given_", "label"),
     [
@@ -195,16 +201,14 @@ def shifted(radius=0.5, aside=0.0, along=0.0, tilt=0.0):
 )
 def test_labels(given_, label):
     for ignore, expected in ((False, label), (True, labels.IGNORED if label == labels.TRUE else labels.AMBIGUOUS)):
-        true = drafts.TrueCylinder(PIPE, 1000, 360.0, ignore)
-        scene = drafts.SyntheticScene(np.zeros((0, 3)), np.zeros(0, np.int32), (true,), 0.0, "pipe", 0, {})
-        (found,), (owner,) = labels.label_fits(scene.truth(), [given_])
+        (found,), (owner,) = labels.label_fits(truth_of(ignore=ignore), [given_])
         assert found == expected
         assert owner == (0 if expected in {labels.TRUE, labels.IGNORED} else None)
 
 
 def test_labels_where_there_is_nothing():
     assert labels.label_fits({"cylinders": []}, [PIPE]) == ([labels.FALSE], [None])
-    assert labels.label_fits({"cylinders": [labels._entry(PIPE)]}, []) == ([], [])
+    assert labels.label_fits(truth_of(), []) == ([], [])
 
 
 TURN = solids.random_turn(np.random.default_rng(0))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-GOLDEN = Path(__file__).resolve().parents[1] / "sample_data" / "golden"
+GOLDEN = Path(__file__).resolve().parents[2] / "sample_data" / "golden"
 PIPES = GOLDEN / "pipes.cylinders.json"
 
 

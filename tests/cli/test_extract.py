@@ -17,6 +17,7 @@ from cylx.config import load_config
 from cylx.errors import InputError, OutputError, UsageError
 from cylx.results import rejections_schema, result_schema
 from cylx.synthetic import single
+from tests.support.terminals import on_a_terminal
 
 pytestmark = pytest.mark.usefixtures("fake_pipeline")
 
@@ -483,26 +484,3 @@ def show_progress(talk):
         observer.stage_finished("compiling", 1.0)
         observer.stage_started("slicing", 2)
         observer.stage_advanced(1)
-
-
-def on_a_terminal(action):
-    """Run an action with standard error on a pseudo-terminal, and give what was shown there."""
-    import pty
-
-    reader, writer = pty.openpty()
-    before = sys.stderr
-    try:
-        with os.fdopen(writer, "w") as sys.stderr:
-            action()
-            sys.stderr.flush()
-            os.set_blocking(reader, False)
-            shown = b""
-            while True:
-                try:
-                    shown += os.read(reader, 65536)
-                except BlockingIOError:
-                    break
-    finally:
-        sys.stderr = before
-        os.close(reader)
-    return shown.decode()

@@ -11,7 +11,7 @@ from cylx.api import extract
 from cylx.io import write_cloud
 from cylx.synthetic import single
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")

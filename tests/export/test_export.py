@@ -307,8 +307,7 @@ def test_dxf_has_centre_lines_in_the_unit_of_the_scan(origin, unit):
 
 SAME = """
 import sys, hashlib
-sys.path.insert(0, 'tests')
-from test_export import FORMATS, export
+from tests.export.test_export import FORMATS, export
 for suffix in sys.argv[1:]:
     print(hashlib.sha256(export(suffix).data).hexdigest())
 """
@@ -320,7 +319,7 @@ def test_the_same_drawing_gives_the_same_bytes():
     assert all(export(suffix).data == once[suffix] for suffix in known)
     done = subprocess.run(
         [sys.executable, "-c", SAME, *known], capture_output=True, text=True, check=True,
-        cwd=Path(__file__).parents[1], env={**os.environ, "PYTHONHASHSEED": "4"},
+        cwd=Path(__file__).parents[2], env={**os.environ, "PYTHONHASHSEED": "4"},
     )  # fmt: skip
     assert done.stdout.split() == [hashlib.sha256(data).hexdigest() for data in once.values()]
 

@@ -125,6 +125,7 @@ def test_a_frame_is_right_handed_and_unit(direction):
 
 # order statistics
 
+
 @settings(max_examples=100, deadline=None)
 @given(lists, st.integers(0, 10))
 def test_the_first_values_are_sorted_and_the_others_stay(values, others):

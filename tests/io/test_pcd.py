@@ -15,7 +15,7 @@ from cylx.errors import InputError
 from cylx.io import read_cloud, write_cloud
 from cylx.optional.open3d import import_open3d
 
-MUG = Path(__file__).resolve().parents[2] / "shared" / "data" / "pcl" / "table_scene_mug_stereo_textured.pcd"
+MUG = Path(__file__).resolve().parents[3] / "shared" / "data" / "pcl" / "table_scene_mug_stereo_textured.pcd"
 BODIES = ["ascii", "binary", "binary_compressed"]
 KINDS = ["i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"]
 FAR = np.array([[512345.678, 5412345.432, 123.4], [5e6 + 0.001, -5e6 - 0.002, 0.003], [1e-3, 0.1, 1 / 3]])

@@ -1,4 +1,4 @@
-"""The report: what it says, what it shows, that no name can break out of it, and that a browser opens it."""
+"""The report: what it says, that no name can break out of it, and that a browser opens it."""
 
 import base64
 import dataclasses
@@ -20,11 +20,10 @@ from cylx.geometry.cylinder import Cylinder, axis_frame
 from cylx.palette import cylinder_colors
 from cylx.records import PointCloud, Source
 from cylx.report import html_of, png_of
-from cylx.report.maps import EMPTY, unroll
 from cylx.report.page import json_for_script
 from cylx.report.page_data import facts_of
 from cylx.report.picture import outline
-from cylx.report.points import LEAST, STEPS, choose_points, original_colors, pack_labels, pack_residuals, quantise
+from cylx.report.points import STEPS
 from cylx.results import Result
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&lt;\u2028\"'{{script}}.ply"
@@ -104,141 +103,6 @@ def test_of_many_refused_ones_the_first_are_told_of(make_extraction):
 def test_the_same_result_gives_the_same_bytes(make_extraction):
     assert html_of(make_extraction()) == html_of(make_extraction())
     assert png_of(make_extraction()) == png_of(make_extraction())
-
-
-# what it shows
-
-
-def test_coordinates_are_off_by_half_a_step_at_most():
-    points = np.random.default_rng(3).normal(size=(5000, 3)) * [100, 1, 1e-3] + [4e6, -5e5, 0]
-    steps, low, size = quantise(points)
-    assert (steps.dtype, steps.min(), steps.max()) == (np.dtype("<u2"), 0, STEPS)
-    assert (np.abs(low + steps / STEPS * size - points) <= size / STEPS * 0.5001 + 1e-9).all()
-
-
-def test_a_flat_cloud_has_a_box_without_thickness():
-    steps, _, size = quantise(np.array([[0.0, 1, 2], [1, 1, 2]]))
-    assert size.tolist() == [1, 0, 0]
-    assert steps.tolist() == [[0, 0, 0], [STEPS, 0, 0]]
-
-
-def test_few_points_are_all_shown():
-    labels = np.array([0, -1, 1], np.int32)
-    assert sorted(choose_points(labels, 3, np.random.default_rng(0))) == [0, 1, 2]
-
-
-def test_many_points_are_chosen_evenly_and_every_cylinder_keeps_some():
-    labels = np.repeat(np.array([-1, 0, 1, 2], np.int32), [800_000, 190_000, 9_970, 30])
-    chosen = choose_points(labels, 50_000, np.random.default_rng(7))
-    assert 49_990 < len(chosen) <= 50_000
-    assert len(np.unique(chosen)) == len(chosen)
-    counts = np.bincount(labels[chosen] + 1)
-    assert counts[3] == 30
-    assert counts[2] >= LEAST
-    assert counts[:2] / counts.sum() == pytest.approx([0.8, 0.19], abs=0.02)
-    others = np.sort(chosen[labels[chosen] == -1])
-    assert np.diff(others).max() < 2.1 * 800_000 / len(others)  # no stretch of the order is left out
-    assert np.mean(chosen[:5000]) == pytest.approx(np.mean(chosen), rel=0.03)  # any beginning is an even choice
-    again = choose_points(labels, 50_000, np.random.default_rng(7))
-    assert np.array_equal(chosen, again)
-
-
-def test_as_many_cylinders_as_points_may_be_shown_are_no_mistake():
-    labels = np.arange(300, dtype=np.int32) % 100
-    chosen = choose_points(labels, 100, np.random.default_rng(0))
-    assert 0 < len(chosen) <= 100
-
-
-def test_labels_take_two_bytes_where_one_is_not_enough():
-    labels = np.array([-1, 0, 254], np.int32)
-    assert pack_labels(labels, 255).tolist() == [255, 0, 254]
-    assert pack_labels(labels, 256).tolist() == [65535, 0, 254]
-    assert pack_labels(labels, 256).dtype == np.dtype("<u2")
-
-
-def test_residuals_are_steps_of_their_limit():
-    assert pack_residuals(np.array([np.nan, 0, 1, -1, 9, -0.5]), 1.0).tolist() == [-128, 0, 127, -127, 127, -64]
-
-
-def rgb(*columns):
-    return dict(zip(("red", "green", "blue"), columns, strict=True))
-
-
-@pytest.mark.parametrize(
-    ("columns", "expected"),
-    [
-        (rgb(np.uint8([1, 2]), np.uint8([3, 4]), np.uint8([5, 6])), [[1, 3, 5], [2, 4, 6]]),
-        (rgb(np.uint16([257, 0]), np.uint16([0, 0]), np.uint16([65535, 0])), [[1, 0, 255], [0, 0, 0]]),
-        (rgb(np.float32([1, 0]), np.float32([0.5, 0]), np.float32([0, np.nan])), [[255, 128, 0], [0, 0, 0]]),
-        ({"rgb": np.uint32([0x010203, 0xFF0000]).view(np.float32)}, [[1, 2, 3], [255, 0, 0]]),
-        ({"intensity": np.float32([1, 2])}, None),
-        ({"red": np.uint8([1, 2])}, None),
-    ],
-)
-def test_the_colours_of_the_input_are_understood(columns, expected):
-    table = np.zeros(3, [(name, "f8") for name in "xyz"] + [(name, values.dtype) for name, values in columns.items()])
-    for name, values in columns.items():
-        table[name][[0, 2]] = values
-    valid = np.array([True, False, True])
-    colors = original_colors(PointCloud(np.zeros((2, 3)), table, valid))
-    assert (colors if colors is None else colors.tolist()) == expected
-
-
-# the map of a cylinder
-
-
-def dented(depth=0.01, noise=0.001, count=40_000):
-    """A slanted pipe of radius 0.5 and height 4, dented between 60° and 120° from its frame in its upper quarter."""
-    rng = np.random.default_rng(5)
-    pipe = Cylinder((10, 20, 30), (0.3, -0.2, 0.93), 0.5, 4.0)
-    across, along = axis_frame(pipe.direction)
-    angles, heights = rng.uniform(-np.pi, np.pi, count), rng.uniform(-2, 2, count)
-    inside = (np.abs(np.degrees(angles) - 90) < 30) & (heights > 1)
-    residuals = rng.normal(0, noise, count) - depth * inside
-    radii = 0.5 + residuals
-    rings = (radii * np.cos(angles))[:, None] * across + (radii * np.sin(angles))[:, None] * along
-    return pipe, pipe.point + heights[:, None] * pipe.direction + rings, residuals, (across, along)
-
-
-def test_a_dent_is_where_it_is_in_the_map():
-    pipe, points, residuals, (across, along) = dented()
-    found = unroll(points, residuals, pipe, noise=0.001)
-    rows, columns = found.means.shape
-    assert (found.means > EMPTY).all()
-    means = found.means / 127 * found.reach
-    zero = np.degrees(np.arctan2(along[0], across[0]))  # it stands: angle 0 is turned to x
-    assert found.zero == "x"
-    angles = (np.arange(columns) + 0.5) * 360 / columns - 180 + zero
-    away = np.abs((angles - 90 + 180) % 360 - 180)
-    levels = (np.arange(rows) + 0.5) / rows
-    edge, step = 360 / columns, 1 / rows
-    dent = (away[None, :] < 30 - edge) & (levels[:, None] > 0.75 + step)
-    rest = (away[None, :] > 30 + edge) | (levels[:, None] < 0.75 - step)
-    assert dent.sum() > 10
-    assert means[dent] == pytest.approx(-0.01, abs=0.002)
-    assert means[rest] == pytest.approx(0, abs=0.002)
-    assert 0.008 < found.limit <= found.reach < 0.013
-
-
-def test_what_is_not_seen_is_empty_in_the_map():
-    pipe, points, residuals, (across, _) = dented(depth=0)
-    seen = (points - pipe.point) @ across > 0
-    found = unroll(points[seen], residuals[seen], pipe, noise=0.001)
-    assert np.mean(found.means[0] > EMPTY) == pytest.approx(0.5, abs=0.05)
-
-
-@pytest.mark.parametrize(("height", "count"), [(0.0, 50), (1e3, 50), (1e-6, 500), (1.0, 0), (4.0, 100_000)])
-def test_a_map_has_at_most_72_by_48_cells(height, count):
-    rng = np.random.default_rng(0)
-    angles = rng.uniform(-np.pi, np.pi, count)
-    heights = height * rng.uniform(-0.5, 0.5, count)
-    points = np.column_stack([np.cos(angles), np.sin(angles), heights])
-    found = unroll(points, rng.normal(0, 0.01, count), Cylinder((0, 0, 0), (0, 0, 1), 1.0, height), 0.01)
-    rows, columns = found.means.shape
-    assert 1 <= rows <= 48
-    assert 8 <= columns <= 72
-    assert np.isfinite([found.reach, found.limit]).all()
-    assert (found.means > EMPTY).any() == (count > 0)
 
 
 # names that want to get out

@@ -12,7 +12,7 @@ from cylx.scene import measure_scene
 from cylx.scene.cautions import SAMPLE, cautions, damage, step_of
 from cylx.synthetic import multi, single
 
-SAMPLES = Path(__file__).resolve().parents[1] / "sample_data"
+SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 PIPES = read_cloud(SAMPLES / "pipes.ply").points
 NOISE = 0.002
 MAP = np.array([5e5, 5e6, 100.0])

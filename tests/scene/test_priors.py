@@ -16,7 +16,7 @@ from cylx.records import PointCloud, Segment
 from cylx.results import Result
 from cylx.synthetic import single
 
-SAMPLE_DATA = Path(__file__).resolve().parents[1] / "sample_data"
+SAMPLE_DATA = Path(__file__).resolve().parents[2] / "sample_data"
 SAMPLES = ["room.pcd", "site_mm.ply", "pipes.ply"]
 
 

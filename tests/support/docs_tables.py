@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
-from test_architecture import MAY_IMPORT
 
 import cylx
 from cylx.cli import main
 from cylx.config import Config, load_config
 from cylx.config.yaml_writer import _allowed, _scalar
 from cylx.results import rejections_schema, result_schema
+from tests.support.arrows import MAY_IMPORT
 
-PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
+PACKAGE = Path(__file__).resolve().parents[2] / "cylx"
 UNITS = {
     "scene units": "scene units",
     "degrees": "degrees",

@@ -14,7 +14,7 @@ from pathlib import Path
 from collect import extracted, result_of, seed_range
 from scenes import KINDS, make
 
-sys.path.append(str(Path(__file__).parents[1]))
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from tables import print_header, print_row
 
 from cylx.evaluation import evaluate

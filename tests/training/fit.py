@@ -16,7 +16,7 @@ from labels import FALSE, TRUE
 from logistic import Rows, balanced_weights, cross_validated, fit_law
 from scores import average_precision, brier, calibration, cylinders_found, log_loss, rates
 
-sys.path.append(str(Path(__file__).parents[1]))
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from tables import number, print_header, print_row
 
 from cylx.config import VerificationConfig
@@ -25,7 +25,7 @@ from cylx.evidence.weights import TERMS
 LEAST = VerificationConfig().min_inliers
 """Fits of fewer points are refused whatever their confidence, so that it need not be right for them."""
 BARS = (0.3, 0.5, 0.7, 0.9)
-PICTURE = Path(__file__).parents[3] / "docs" / "pictures" / "calibration.png"
+PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "calibration.png"
 
 
 def read_rows(paths):

@@ -12,7 +12,7 @@ from pathlib import Path
 from fit import read_rows
 from labels import AMBIGUOUS, FALSE, IGNORED, TRUE
 
-sys.path.append(str(Path(__file__).parents[1]))
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from tables import print_header, print_row
 
 BINS = ((0.5, 0.7), (0.7, 0.9), (0.9, 0.97), (0.97, 1.0))

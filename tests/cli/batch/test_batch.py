@@ -1,4 +1,4 @@
-"""Many scans at once: which they are, what is done again, what fails, and what is said of all of them."""
+"""Many scans at once: what is done again, what fails, and what is said of all of them."""
 
 import csv
 import dataclasses
@@ -9,17 +9,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import POINTS
-from test_cli_extract import on_a_terminal
 
-from cylx.cli.batch.many import Many
-from cylx.cli.batch.memory import memory_available
-from cylx.cli.batch.scans import find_scans
 from cylx.cli.batch.summary import COLUMNS, table_text
-from cylx.cli.options.batch import Processes
-from cylx.cli.terminal.display import Conversation
-from cylx.errors import InputError
-from cylx.io import expected_points, remove_leftovers, temporary_beside
+from cylx.io import remove_leftovers, temporary_beside
+from tests.conftest import POINTS
 
 BROKEN = {"07.xyz": b"", "11.xyz": b"ply, says nobody\n", "13.xyz": b"0 0 0\n1 1 1\n"}
 
@@ -407,139 +400,9 @@ def test_what_the_dead_left_is_removed(tmp_path):
     assert sorted(tmp_path.iterdir()) == sorted(others[1:])
 
 
-# which scans are meant
-
-
-@pytest.fixture
-def tree(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    for name in (
-        "b.ply",
-        "a.PCD",
-        "notes.md",
-        ".hidden.ply",
-        "a.annotated.ply",
-        "sub/c.xyz",
-        ".git/d.ply",
-        "sub/x.dat",
-    ):
-        (tmp_path / "s" / name).parent.mkdir(exist_ok=True, parents=True)
-        (tmp_path / "s" / name).touch()
-    (tmp_path / "s" / "summary.csv").write_text(",".join(COLUMNS) + "\n")
-    (tmp_path / "s" / "sub" / "summary.csv").write_text("x,y,z\n")
-
-
-@pytest.mark.parametrize(
-    ("given", "recursive", "found"),
-    [
-        (["s"], False, ["s/a.PCD", "s/b.ply"]),
-        (["s/"], True, ["s/a.PCD", "s/b.ply", "s/sub/c.xyz", "s/sub/summary.csv"]),
-        (["s/*.ply"], False, ["s/b.ply"]),
-        (["s/*"], False, ["s/a.PCD", "s/b.ply"]),
-        (["s/**/*.xyz"], False, ["s/sub/c.xyz"]),
-        (["s/sub/*.dat"], False, ["s/sub/x.dat"]),
-        (["s/[ab].*"], False, ["s/a.PCD", "s/b.ply"]),
-        (["s/b.ply", "s", "./s/b.ply"], False, ["s/b.ply", "s/a.PCD"]),
-        (["s/a.annotated.ply", "gone.ply", "-"], False, ["s/a.annotated.ply", "gone.ply", "-"]),
-    ],
-)
-def test_folders_and_patterns_are_expanded(tree, given, recursive, found):
-    assert [Path(name).as_posix() for name in find_scans(given, recursive=recursive)] == found
-
-
-def test_a_name_that_looks_like_a_pattern_is_a_name(tree, tmp_path):
-    (tmp_path / "[ab].ply").touch()
-    assert find_scans(["[ab].ply"], recursive=False) == ["[ab].ply"]
-
-
-def test_a_folder_that_may_not_be_read_is_refused(tree, monkeypatch):
-    def refuse(path):
-        raise PermissionError(13, "Permission denied", path)
-
-    monkeypatch.setattr("os.scandir", refuse)
-    with pytest.raises(InputError, match=r"^s: cannot be read: permission denied; change its permissions"):
-        find_scans(["s"], recursive=False)
-
-
 # how many at once
 
 
 def test_one_scan_is_done_here_whatever_the_jobs(run_cylx, scans, pipeline):
     assert run_cylx("extract", "scans/00.xyz", "--jobs", "2", "-q").exit_code == 0
     assert pipeline.calls == ("00.xyz",)
-
-
-@pytest.mark.parametrize(
-    ("jobs", "available", "processes"),
-    [(None, 1e9, None), (3, 1e6, 3), (9, 1e9, 4), (0, 0.9e9, 3), (0, 1e5, 1), (0, None, 4)],
-)
-def test_jobs_are_as_many_as_there_is_room_for(monkeypatch, jobs, available, processes):
-    monkeypatch.setattr("cylx.cli.batch.many.memory_available", lambda: available)
-    monkeypatch.setattr("cylx.cli.batch.many.cores", lambda: 8)
-    assert Many(None, False, jobs, False, None).processes(list("abcd")) == processes
-    assert Processes().convert("auto", None, None) == 0
-
-
-@pytest.mark.parametrize(
-    ("files", "available"),
-    [
-        ({}, None),
-        ({"meminfo": "MemFree: 1 kB\nMemAvailable:   2000 kB\n"}, 2_048_000),
-        ({"meminfo": "MemAvailable: 2000 kB\n", "memory.max": "max\n", "memory.current": "5\n"}, 2_048_000),
-        ({"meminfo": "MemAvailable: 2000 kB\n", "memory.max": "900000\n", "memory.current": "500000\n"}, 400_000),
-        (
-            {
-                "meminfo": "MemAvailable: 2000 kB\n",
-                "memory.max": "900000\n",
-                "memory.current": "500000\n",
-                "memory.stat": "anon 7\ninactive_file 100000\n",
-            },
-            500_000,
-        ),
-    ],
-)
-def test_memory_is_what_the_system_and_the_container_leave(tmp_path, monkeypatch, files, available):
-    for name, text in files.items():
-        (tmp_path / name).write_text(text)
-    monkeypatch.setattr("cylx.cli.batch.memory.MEMINFO", tmp_path / "meminfo")
-    monkeypatch.setattr("cylx.cli.batch.memory.CONTAINER", tmp_path)
-    assert memory_available() == available
-
-
-LAS = bytearray(375)
-LAS[:4], LAS[25], LAS[247:249] = b"LASF", 4, b"\x10\x01"
-
-
-@pytest.mark.parametrize(
-    ("content", "points"),
-    [
-        (b"ply\nformat ascii 1.0\nelement vertex 7\nproperty float x\n" + bytes(100), 7),
-        (b"ply\r\nformat ascii 1.0\r\nelement vertex 123456789\r\n", 49),
-        (b"# .PCD v.7\nVERSION .7\nPOINTS 9\nDATA binary\n" + bytes(100), 9),
-        (b"VERSION .7\nPOINTS 9\nDATA ascii\n", 9),
-        (bytes(LAS), 272),
-        (b"1 2 3\n" * 1000, 1000),
-        (b"1 2 3\n" * 100_000, 100_000),
-        (b"\0" * 800, 100),
-        (b"", 0),
-    ],
-)
-def test_points_are_expected_by_header_or_size(tmp_path, content, points):
-    (tmp_path / "scan").write_bytes(content)
-    assert expected_points(tmp_path / "scan") == pytest.approx(points, rel=0.001)
-    assert expected_points(tmp_path / "gone") == expected_points(tmp_path) == 0
-
-
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no pseudo-terminals")
-def test_progress_is_shown_on_a_terminal(monkeypatch):
-    monkeypatch.setenv("TERM", "xterm")
-
-    def show(talk):
-        with talk.counting(5) as advance:
-            advance()
-            talk.say("a line in between")
-
-    shown = on_a_terminal(lambda: show(Conversation()))
-    assert "1/5" in shown
-    assert "a line in between" in shown
-    assert "1/5" not in on_a_terminal(lambda: show(Conversation(quiet=True)))

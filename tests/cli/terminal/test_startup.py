@@ -6,7 +6,7 @@ from pathlib import Path
 
 from cylx.cli.terminal.startup import BLAS
 
-SAMPLE = Path(__file__).parents[1] / "sample_data" / "room.pcd"
+SAMPLE = Path(__file__).parents[3] / "sample_data" / "room.pcd"
 
 
 def told(program, *arguments):
