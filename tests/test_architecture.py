@@ -5,46 +5,11 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.arrows import MAY_IMPORT
+
 PACKAGE = Path(__file__).resolve().parents[1] / "cylx"
 FILES = sorted(PACKAGE.rglob("*.py"))
 
-MAY_IMPORT = {
-    "__main__": {"cli"},
-    "cylx": {
-        "api", "config", "errors", "evaluation", "geometry", "io", "moved", "pipeline", "records", "report", "results",
-        "version",
-    },
-    "cli": {
-        "api", "config", "errors", "evaluation", "experiments", "export", "io", "optional", "palette", "pipeline",
-        "records", "report", "results", "scene", "synthetic", "version",
-    },
-    "api": {"config", "evaluation", "geometry", "io", "pipeline", "records", "results", "scene", "stages"},
-    "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
-    "pipeline": {
-        "baselines", "config", "errors", "fits", "game", "geometry", "records", "scene", "stages",
-    },
-    "stages": {"config", "evidence", "fits", "game", "geometry", "records"},
-    "report": {"config", "errors", "geometry", "optional", "palette", "records", "results"},
-    "export": {"errors", "geometry", "optional", "results", "version"},
-    "scene": {"config", "errors", "fits", "geometry", "records"},
-    "game": {"geometry", "records"},
-    "baselines": {"config", "errors", "fits", "geometry", "optional", "records"},
-    "results": {"config", "errors", "optional", "records", "version"},
-    "io": {"errors", "optional", "palette", "records"},
-    "evidence": {"geometry", "records"},
-    "records": {"config", "fits", "geometry"},
-    "synthetic": {"errors", "geometry"},
-    "evaluation": {"errors", "geometry"},
-    "config": {"errors"},
-    "optional": {"errors"},
-    "fits": {"geometry"},
-    "geometry": set(),
-    "errors": set(),
-    "moved": set(),
-    "palette": set(),
-    "version": set(),
-}  # fmt: skip
-"""The rooms from the top floor to the ground; each imports from those below it only."""
 OWN_SECTION = {
     "curvature": "CandidatesConfig",
     "local_slices": "SlicingConfig",

@@ -9,7 +9,6 @@ import re
 import click
 import pytest
 import yaml
-from docs_tables import PACKAGE, TABLES, TOLD, commands, config_keys, config_sections, options_of
 
 from cylx import errors
 from cylx.config import Config
@@ -19,6 +18,7 @@ from cylx.pipeline import candidates, rounds
 from cylx.records import Scene
 from cylx.scene import priors, resolve
 from cylx.stages import averaging, clustering, curvature, local_slices, verification
+from tests.support.docs_tables import PACKAGE, TABLES, TOLD, commands, config_keys, config_sections, options_of
 
 ROOT = PACKAGE.parent
 DOCS = ROOT / "docs"

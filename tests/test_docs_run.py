@@ -8,7 +8,6 @@ words must agree, the numbers nearly. `--regen` writes them anew.
 import contextlib
 import io
 import json
-import math
 import os
 import re
 import shutil
@@ -19,6 +18,8 @@ from typing import NamedTuple
 
 import pytest
 import yaml
+
+from tests.support.texts import same
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -47,15 +48,6 @@ def blocks_of(page):
         between = page[last : found.start()].strip() if last >= 0 else "the beginning"
         yield Block(found[2], found[3], found.start(3), found.end(3), found[1] or "", not between)
         last = found.end()
-
-
-def same(shown, found):
-    """Tell whether two texts have the same words and nearly the same numbers."""
-    numbers = [[float(number) for number in NUMBER.findall(text)] for text in (shown, found)]
-    words = [re.sub("─+", "─", NUMBER.sub("#", text)).split() for text in (shown, found)]
-    return words[0] == words[1] and all(
-        math.isclose(a, b, rel_tol=0.05, abs_tol=2e-3) for a, b in zip(*numbers, strict=True)
-    )
 
 
 def test_what_counts_as_the_same():

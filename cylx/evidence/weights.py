@@ -6,7 +6,7 @@ the same: rooms with boxes sharp and rounded, spheres, ellipsoids, cones, elbows
 little of each cylinder to be seen, or with noise that neighbours share; racks of pipes as four scanners see them, half
 of them in scan lines, half of them out of round and dented; steelwork with a few pipes, seen likewise; household things
 before a depth camera, dented cans and fruit among them; solids that are nearly cylinders; and rooms full of pipes and
-noise. False fits weigh double. `tests/benchmarks/evidence` makes the scenes and fits the weights. No term may speak
+noise. False fits weigh double. `tests/training` makes the scenes and fits the weights. No term may speak
 against its own meaning: the signs are fixed before the fit.
 
 What is not fitted are the terms themselves: `FORM`, `FORM_NOISES`, `TELLING`, `THIN`, `BEHIND`, and the limits in the

@@ -1,0 +1,200 @@
+"""Fit the weights of `cylx.evidence` to rows of `collect.py`, and say how far they can be trusted.
+
+The terms and their signs are those of `cylx.evidence.weights.TERMS`; the weights are fitted anew. All tables are
+cross-validated by scene: each fit is judged by weights that were found without its scene. Fits of a true cylinder that
+need not be found, and those near one that are neither it nor something else, are counted and left out.
+"""
+
+import argparse
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from labels import FALSE, TRUE
+from logistic import Rows, balanced_weights, cross_validated, fit_law
+from scores import average_precision, brier, calibration, cylinders_found, log_loss, rates
+
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
+from tables import number, print_header, print_row
+
+from cylx.config import VerificationConfig
+from cylx.evidence.weights import TERMS
+
+LEAST = VerificationConfig().min_inliers
+"""Fits of fewer points are refused whatever their confidence, so that it need not be right for them."""
+BARS = (0.3, 0.5, 0.7, 0.9)
+PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "calibration.png"
+
+
+def read_rows(paths):
+    """Read the lines of files; a scene that two of them have would count twice."""
+    lines, scenes = [], set()
+    for path in paths:
+        fresh = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        there = {line["scene"] for line in fresh}
+        if there & scenes:
+            raise SystemExit(f"{path}: {', '.join(sorted(there & scenes))}: in another file, too; give it once")
+        lines, scenes = lines + fresh, scenes | there
+    return lines
+
+
+def table_of(lines, terms=TERMS):
+    """Make of lines the rows of the regression: those that are clearly true or false, by the values of the terms."""
+    clear = [line for line in lines if line["label"] in {TRUE, FALSE} and line["measures"]["inliers"] >= LEAST]
+    values = [[term.value(line["measures"]) for term in terms] for line in clear]
+    return Rows(
+        terms=np.array(values, dtype=np.float64).reshape(len(clear), len(terms)),
+        true=np.array([line["label"] == TRUE for line in clear], dtype=bool),
+        scenes=np.array([line["scene"] for line in clear]),
+        owners=np.array([-1 if line["cylinder"] is None else line["cylinder"] for line in clear], dtype=np.int64),
+    )
+
+
+def signs_of(terms):
+    """Give the sign of each term's weight, a zero having one, too: a term may lose its weight, not its meaning."""
+    return np.copysign(1.0, [term.weight for term in terms])
+
+
+def written(law, rows, terms=TERMS):
+    """Write a law as those lines of `cylx/evidence/weights.py` that change; `usual` is the mean over true cylinders."""
+    share = balanced_weights(rows) * rows.true
+    usual = share @ rows.terms / share.sum()
+    lines = [f"BIAS = {law.bias:.3f}"]
+    lines += [
+        f'    Term("{term.reason}", {weight:.3f}, {mean:.2f}, ...'
+        for term, weight, mean in zip(terms, law.weights, usual, strict=True)
+    ]
+    return "\n".join(lines)
+
+
+def quality(probability, rows):
+    """Give the numbers that two sets of terms are compared by."""
+    share = balanced_weights(rows)
+    return {
+        "log_loss": log_loss(probability, rows.true, share),
+        "brier": brier(probability, rows.true, share),
+        "average_precision": average_precision(probability, rows.true),
+        "false": int(((probability >= 0.5) & ~rows.true).sum()),
+    }
+
+
+def left_out(rows, signs):
+    """Give, for each term, the cross-validated probabilities without it."""
+    return [cross_validated(rows.without(k), np.delete(signs, k)) for k in range(len(signs))]
+
+
+def laws_without(rows, signs, terms=TERMS):
+    """Give the law of all terms and those of all but one, as JSON for `ablation.py`."""
+
+    def as_json(law, names):
+        return {"bias": law.bias, "weights": dict(zip(names, law.weights.tolist(), strict=True))}
+
+    names = [term.reason for term in terms]
+    return {
+        "all": as_json(fit_law(rows, signs), names),
+        "without": {
+            name: as_json(fit_law(rows.without(k), np.delete(signs, k)), names[:k] + names[k + 1 :])
+            for k, name in enumerate(names)
+        },
+    }
+
+
+def print_calibration(probability, rows):
+    """Print how often fits of a confidence are true."""
+    print_header("confidence", "fits", "mean confidence", "true")
+    for low, high, count, mean, share in calibration(probability, rows.true):
+        print_row(f"{low:g} to {high:g}", str(count), f"{mean:.3f}", f"{share:.3f}")
+
+
+def print_rates(probability, rows):
+    """Print what several bars find and let through."""
+    print_header("bar", "precision of fits", "recall of fits", "true cylinders found", "false fits")
+    for bar in BARS:
+        precision, recall = (None if rate is None else float(rate) for rate in rates(probability, rows.true, bar))
+        found, false = cylinders_found(probability, rows, bar), int(((probability >= bar) & ~rows.true).sum())
+        print_row(f"{bar:g}", number(precision), number(recall), str(len(found)), str(false))
+
+
+def print_ablation(probability, rows, signs, terms=TERMS):
+    """Print what becomes of everything without each term."""
+    print_header(
+        "without", "log-loss", "Brier", "average precision", "false fits at 0.5", "true cylinders lost", "gained"
+    )
+    full = cylinders_found(probability, rows, 0.5)
+    without = [("nothing", probability)]
+    without += zip([term.reason for term in terms], left_out(rows, signs), strict=True)
+    for name, values in without:
+        score, found = quality(values, rows), cylinders_found(values, rows, 0.5)
+        print_row(
+            name,
+            f"{score['log_loss']:.4f}",
+            f"{score['brier']:.4f}",
+            f"{score['average_precision']:.4f}",
+            str(score["false"]),
+            str(len(full - found)),
+            str(len(found - full)),
+        )
+
+
+def draw(probability, rows, path):
+    """Draw the share of true fits by confidence, with two standard errors, over a histogram."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    table = calibration(probability, rows.true, np.linspace(0, 1, 11))
+    _, _, counts, means, shares = map(np.array, zip(*table, strict=True))
+    errors = 2.0 * np.sqrt(np.maximum(shares * (1 - shares), 1.0 / counts) / counts)
+    figure, (top, bottom) = plt.subplots(2, 1, figsize=(5, 6), sharex=True, height_ratios=(3, 1), layout="constrained")
+    top.plot([0, 1], [0, 1], color="0.7", linewidth=1)
+    top.errorbar(means, shares, np.minimum(errors, [shares, 1 - shares]), fmt="o", color="tab:blue", capsize=3)
+    top.set(ylabel="share of fits that are true", xlim=(0, 1), ylim=(-0.02, 1.02))
+    bins = np.linspace(0, 1, 21)
+    kinds = [probability[rows.true], probability[~rows.true]]
+    bottom.hist(kinds, bins, histtype="step", log=True, label=["true", "false"], color=["tab:blue", "tab:orange"])
+    bottom.set(xlabel="confidence, from weights found without the scene", ylabel="fits")
+    bottom.legend()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=100, metadata={"Software": None})
+    plt.close(figure)
+
+
+def parse():
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("rows", nargs="+", type=Path, metavar="ROWS.jsonl")
+    parser.add_argument("--ablation", type=Path, metavar="FILE", help="write the weights without each term as JSON")
+    parser.add_argument(
+        "--plot", nargs="?", type=Path, const=PICTURE, metavar="PNG", help="draw the calibration (docs/pictures)"
+    )
+    return parser.parse_args()
+
+
+def main():
+    """Fit, and print everything."""
+    a = parse()
+    lines = read_rows(a.rows)
+    rows, signs = table_of(lines), signs_of(TERMS)
+    counts = Counter(line["label"] for line in lines)
+    print(f"{len(set(rows.scenes))} scenes, {len(lines)} fits: {', '.join(f'{n} {k}' for k, n in counts.items())}\n")
+    print(f"{written(fit_law(rows, signs), rows)}\n")
+    probability = cross_validated(rows, signs)
+    score = quality(probability, rows)
+    print(f"Cross-validated log-loss {score['log_loss']:.4f}, Brier score {score['brier']:.4f}\n")
+    print_calibration(probability, rows)
+    print()
+    print_rates(probability, rows)
+    print()
+    print_ablation(probability, rows, signs)
+    if a.ablation:
+        a.ablation.write_text(json.dumps(laws_without(rows, signs), indent=2) + "\n", encoding="utf-8")
+    if a.plot:
+        draw(probability, rows, a.plot)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
