@@ -269,6 +269,18 @@ def test_every_file_of_the_package_is_on_the_page_of_the_design():
     assert not re.findall(r"^- `.*`: *$", rooms, re.MULTILINE)
 
 
+def questions():
+    """Give the questions of a newcomer, each with the file that answers it and a name defined there."""
+    for question, path, name in rows_of(part(read("docs/design.md"), "## Where is …?").partition("\n### ")[0])[1:]:
+        yield pytest.param(path.strip("`"), name.strip("`"), id=question)
+
+
+@pytest.mark.parametrize(("path", "name"), list(questions()))
+def test_the_file_that_answers_a_question_defines_the_name(path, name):
+    defined = rf"^(?:def {name}\b|class {name}\b|{name}(?:: .*)? = )"
+    assert re.search(defined, read(path), re.MULTILINE)
+
+
 def files_of(block):
     folder = re.search(r"(cylx[\w/]*/)`", block)
     return [folder[1] + name for name in re.findall(r"^- `(.*?)`", block, re.MULTILINE)] if folder else []
