@@ -92,8 +92,7 @@ def test_every_command_and_option_has_help_and_is_told_of(path, command):
 def test_every_exit_code_is_told_of():
     kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, errors.CylxError)]
     codes = {str(kind.exit_code) for kind in kinds} | {"0", "1", "130", "141"}
-    for page, heading in (("docs/command-line.md", "## Exit codes"), ("README.md", "## Exit codes")):
-        assert {row[0].strip("`") for row in rows_of(part(read(page), heading))[1:]} == codes
+    assert {row[0].strip("`") for row in rows_of(part(read("docs/command-line.md"), "## Exit codes"))[1:]} == codes
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -266,6 +265,25 @@ def test_every_file_of_the_package_is_on_the_page_of_the_design():
     assert sorted(told) == sorted(path.relative_to(ROOT).as_posix() for path in there)
     assert all(re.findall(r"^- `.*`: \S.*$", rooms, re.MULTILINE))
     assert not re.findall(r"^- `.*`: *$", rooms, re.MULTILINE)
+
+
+def questions():
+    """Give the questions of a newcomer, each with the file that answers it and a name defined there."""
+    for question, path, name in rows_of(part(read("docs/design.md"), "## Where is …?").partition("\n### ")[0])[1:]:
+        yield pytest.param(path.strip("`"), name.strip("`"), id=question)
+
+
+@pytest.mark.parametrize(("path", "name"), list(questions()))
+def test_the_file_that_answers_a_question_defines_the_name(path, name):
+    defined = rf"^(?:def {name}\b|class {name}\b|{name}(?:: .*)? = )"
+    assert re.search(defined, read(path), re.MULTILINE)
+
+
+def test_the_files_to_change_when_contributing_are_there():
+    named = set(re.findall(r"`(cylx/[a-z_/]+\.py)`", part(read("docs/design.md"), "## Contributing")))
+    new = {"cylx/io/abc.py", "cylx/export/abc.py"}  # that of an example
+    assert new <= named
+    assert [path for path in sorted(named - new) if not (ROOT / path).is_file()] == []
 
 
 def files_of(block):

@@ -81,7 +81,8 @@ def excerpt(source, folder):
     value = json.loads((folder / file).read_text(encoding="utf-8"))
     for key in keys.split():
         value = value[int(key) if isinstance(value, list) else key]
-    value.pop(left_out, None)
+    for name in left_out.split(" and "):
+        value.pop(name, None)
     text = json.dumps(shorten(value), indent=2, ensure_ascii=False)
     return re.sub(r"\[\s+([^\[\]{}]*?)\s+\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
 
