@@ -204,13 +204,15 @@ class VerificationConfig(Section):
     """Verify cylinders; the paper does not."""
     min_confidence: Share = 0.5
     """Least confidence. Raising it gives fewer false cylinders and more missed ones."""
-    min_inliers: Annotated[int, Field(ge=0)] = 40
+    blends: bool = True
+    """Report arcs that go on tangentially on both sides (rounds, fillets, slot ends) by themselves, as blends."""
+    min_inliers: Annotated[int, Field(ge=0)] = 20
     """Fewest points of a cylinder."""
     min_coverage_deg: Annotated[Number, Field(ge=0, le=360)] = 20.0
     """Smallest angle about the axis that must be covered, degrees. This limit holds even if `enabled` is false."""
-    min_height: Annotated[Number, Field(ge=0)] = 0.4
-    """Smallest visible length, in radii."""
-    max_slope: Annotated[Number, Field(ge=0)] = 0.03
-    """Largest change of the radius along the axis, beyond three standard errors: tells a cylinder from a cone."""
-    max_bulge: Annotated[Number, Field(ge=0)] = 0.15
-    """Largest curvature along the axis times the radius, beyond three standard errors; a sphere has 1."""
+    min_height: Annotated[Number, Field(ge=0)] | None = None
+    """Smallest visible length, in radii; null leaves it to the confidence."""
+    max_slope: Annotated[Number, Field(ge=0)] | None = None
+    """Largest change of the radius along the axis, beyond three standard errors; null leaves it to the confidence."""
+    max_bulge: Annotated[Number, Field(ge=0)] | None = None
+    """Largest curvature along the axis times the radius, beyond three standard errors; null: as above."""

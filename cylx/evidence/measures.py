@@ -18,8 +18,18 @@ PLACES = 12.0
 """More places than these about an axis tell no more."""
 GAP_BEYOND_CHANCE = 4.0
 """A gap this much wider than is to be expected by chance is none by chance."""
+ROUGH = 0.04
+"""Scatter that a surface may have whatever the noise, as a share of the radius: bark, dents, what is out of round."""
+LESS = 0.5
+"""A surface may scatter less than the noise of its surroundings, down to this share."""
 SPARSE = 0.2
 """Where there is less than this share of the usual density, points lie between lines."""
+BESIDE, LEAST_FREEDOM = 6.0, 8
+"""Points whose mean each is compared with, and degrees of freedom without which that tells nothing."""
+FLAT_RISE = 8.0
+"""A flat window may hide so many deviations of a curve."""
+FLAT_LEAST = 0.02
+"""And this share of the radius at least."""
 LINE_SHARE = 0.1
 """Fewer points than this share are not a line but strays."""
 
@@ -63,16 +73,28 @@ class Shell:
         )
 
 
+def scatter_of(segment: Segment, noise: float) -> float:
+    """Return the standard deviation of a segment's points: its own, within what a surface may have.
+
+    Parameters
+    ----------
+    segment : Segment
+    noise : float
+        About it, as far as it is known.
+    """
+    return max(min(segment.spread, max(2.0 * noise, ROUGH * float(segment.model[6]))), LESS * noise)
+
+
 def look_at(segment: Segment, indexed: IndexedCloud) -> Shell:
     """Collect the points in and about a segment."""
     model, half = segment.model, segment.half
     noise = indexed.noise_about(model, half)
-    deviation = max(min(segment.spread, 2.0 * noise), noise)
+    deviation = scatter_of(segment, noise)
     near = indexed.cells.near_cylinder(
         model, -half, half, 0.0, model[RADIUS] + max(0.5 * model[RADIUS], 10.0 * deviation)
     )
     heights, residuals, angles = coordinates_of(indexed.points, near, model)
-    flat = ~indexed.may_be_on(near, model[RADIUS])
+    flat = ~indexed.may_be_on(near, model, segment.flat_share)
     on = (np.abs(residuals) < 3.0 * deviation) & ~flat
     return Shell(near, heights / max(half, 1e-300), residuals, angles, on, flat, deviation)
 
@@ -189,18 +211,91 @@ def _fill_shape(z: FloatArray, residuals: FloatArray, angles: FloatArray, gram: 
             gram[a, b] = gram[b, a]
 
 
-def lack_of_fit(shell: Shell, deviation: float) -> tuple[float, float]:
-    """Give chi-square per cell of the mean residuals over the surface, and the rms of what is structure in them."""
+def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
+    """Measure how the mean residuals over the surface deviate from zero, and what shape would explain it.
+
+    Returns
+    -------
+    dict of str to float
+        `lack_of_fit`: chi-square per cell; `structure`: the rms of what is structure in the residuals, frame units;
+        `ovality`: the rms of an ellipse in it, frame units; `explained`: the largest share of it that a cone, a barrel,
+        a bent or an elliptic cylinder would explain, in [0, 1].
+    """
     z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
     rows = int(np.clip(len(z) / 60, 3, 8))
     cell = ((angles / (2.0 * np.pi) + 0.5) * 24).astype(np.int64) % 24 * rows
     cell += np.clip(((z + 1.0) / 2.0 * rows).astype(np.int64), 0, rows - 1)
-    counts = np.bincount(cell, minlength=24 * rows)
-    sums = np.bincount(cell, residuals, minlength=24 * rows)
+    counts = np.bincount(cell, minlength=24 * rows).astype(np.float64)
     full = counts >= 4
     if full.sum() <= 6:
-        return 1.0, 0.0
-    squares = float((sums[full] ** 2 / counts[full]).sum())
+        return {"lack_of_fit": 1.0, "structure": 0.0, "ovality": 0.0, "explained": 0.0}
+    total, cells = float(counts[full].sum()), float(full.sum())
+    sums = np.bincount(cell, residuals, minlength=24 * rows)[full]
+    squares = float((sums**2 / counts[full]).sum())
     variance = max(deviation**2, 1e-300)  # points may lie on the surface exactly
-    excess = max(0.0, (squares - float(full.sum()) * variance) / float(counts[full].sum()))
-    return squares / variance / max(int(full.sum()) - 5, 1), math.sqrt(excess)
+    excess = max(0.0, (squares - cells * variance) / total)
+    weights = np.sqrt(counts[full])
+    middle = np.bincount(cell, z, minlength=24 * rows)[full] / counts[full]
+    turn = (np.flatnonzero(full) // rows + 0.5) / 24.0 * 2.0 * np.pi - np.pi
+    cosine, sine, one = np.cos(turn), np.sin(turn), np.ones(len(turn))
+    base = [cosine, sine, middle * cosine, middle * sine, one]
+    shapes = {
+        "cone": [middle],
+        "barrel": [middle**2],
+        "bent": [middle**2 * cosine, middle**2 * sine],
+        "oval": [np.cos(2.0 * turn), np.sin(2.0 * turn)],
+    }
+    means = sums / counts[full] * weights
+    left = _left_over(base, weights, means)
+    gains = {
+        name: max(0.0, left - _left_over(base + terms, weights, means) - 2.0 * len(terms) * variance)
+        for name, terms in shapes.items()
+    }
+    return {
+        "lack_of_fit": squares / variance / max(int(cells) - 5, 1),
+        "structure": math.sqrt(excess),
+        "ovality": math.sqrt(gains["oval"] / total),
+        "explained": max(gains.values()) / left if left > 0.0 else 0.0,
+    }
+
+
+def own_scatter(shell: Shell, radius: float, half: float, coverage: float) -> float:
+    """Return how far points scatter about the mean of the few beside them: the noise of this surface, without its form.
+
+    Parameters
+    ----------
+    shell : Shell
+    radius, half : float
+        Of the segment, frame units.
+    coverage : float
+        Angle that is covered, radians.
+    """
+    z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
+    count = len(z)
+    area = 2.0 * half * radius * max(coverage, 0.1)
+    side = math.sqrt(area * BESIDE / max(count, 1))
+    rows = int(np.clip(round(2.0 * half / max(side, 1e-300)), 1, 10000))
+    columns = int(np.clip(round(2.0 * math.pi * radius / max(side, 1e-300)), 6, 10000))
+    cell = np.clip(((angles / (2.0 * np.pi) + 0.5) * columns).astype(np.int64), 0, columns - 1) * rows
+    cell += np.clip(((z + 1.0) / 2.0 * rows).astype(np.int64), 0, rows - 1)
+    _, where = np.unique(cell, return_inverse=True)
+    counts = np.bincount(where)
+    means = np.bincount(where, residuals) / counts
+    freedom = count - len(counts)
+    within = float(((residuals - means[where]) ** 2).sum())
+    return math.sqrt(within / freedom) if freedom >= LEAST_FREEDOM else math.sqrt(float((residuals**2).mean()))
+
+
+def _left_over(terms: list[FloatArray], weights: FloatArray, values: FloatArray) -> float:
+    """Return the sum of squares that a weighted fit of the terms leaves."""
+    design = np.stack(terms, axis=1) * weights[:, None]
+    fitted, *_ = np.linalg.lstsq(design, values, rcond=1e-6)
+    return float(((values - design @ fitted) ** 2).sum())
+
+
+def facets(shell: Shell, flatness: FloatArray, radius: float, deviation: float) -> float:
+    """Return the share of the surface that lies in flat windows so wide that a cylinder would curve out of them."""
+    own = flatness[shell.indices[shell.on]]
+    if len(own) == 0:
+        return 0.0
+    return float((own * own > 2.0 * radius * max(FLAT_RISE * deviation, FLAT_LEAST * radius)).mean())

@@ -18,6 +18,8 @@ MIDDLE = 0.9
 """Share of the height over which flanks are counted."""
 LEAST_ON = 10
 """Points on the surface without which there is no density to compare with."""
+WALL, WALL_SHARE, WALL_SECTORS = 0.04, 0.5, 9
+"""The inner wall of a tube is so thick at most, in radii, holds this share of what is inside, over so many sectors."""
 ARC_SHARE = 0.3
 """Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
 
@@ -32,6 +34,7 @@ def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
     on = np.abs(shell.residuals) < 3.0 * shell.deviation
     inside = shell.residuals < -4.0 * shell.deviation
     outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
+    inside &= ~_on_inner_wall(shell, inside, radius)
     counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT) for mask in (on, inside, outside)]
     full = counts[0] >= 1
     if not full.any():
@@ -42,23 +45,46 @@ def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
     )
 
 
-def continuation(shell: Shell, radius: float) -> float:
+def _on_inner_wall(shell: Shell, inside: MaskArray, radius: float) -> MaskArray:
+    """Tell which of the points inside lie on a cylinder about the same axis: the inner wall of a tube or of a mug."""
+    where = np.flatnonzero(inside)
+    none = np.zeros(len(inside), np.bool_)
+    if len(where) < LEAST_ON:
+        return none
+    where = where[np.argsort(shell.residuals[where], kind="stable")]
+    depths = shell.residuals[where]
+    counts = np.searchsorted(depths, depths + max(6.0 * shell.deviation, WALL * radius), "right") - np.arange(
+        len(where)
+    )
+    first = int(counts.argmax())
+    wall = where[first : first + int(counts[first])]
+    if len(wall) < WALL_SHARE * len(where) or len(np.unique(sector_of(shell.angles[wall]))) < WALL_SECTORS:
+        return none
+    none[wall] = True
+    return none
+
+
+def continuation(shell: Shell, radius: float) -> tuple[float, float]:
     """Give the density of points that go on tangentially past an end of the arc, as a share of the arc's own.
 
-    A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends. Of arcs of more
-    than half a turn, that is the lesser of the two.
+    A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends.
+
+    Returns
+    -------
+    tangent, both : float
+        Of the two ends the one with more, and the one with less. Of arcs of more than half a turn both are the latter.
     """
     middle = np.abs(shell.heights) <= 0.8
-    on = middle & (np.abs(shell.residuals) < 3.0 * shell.deviation)
+    on = middle & shell.on
     closed = filled_sectors(shell.angles[on], SECTORS, ARC_SHARE) if on.any() else np.zeros(SECTORS, np.bool_)
     for _ in range(2):  # gaps of up to two sectors are not ends
         for step in (1, 2):
             closed |= np.roll(closed, 1) & np.roll(closed, -step)
     if closed.all() or not closed.any():
-        return 0.0
+        return 0.0, 0.0
     start, length = _longest_run(closed)
     if length >= SECTORS - 3:
-        return 0.0
+        return 0.0, 0.0
     width = 2.0 * math.pi / SECTORS
     counts = np.bincount(sector_of(shell.angles[on]), minlength=SECTORS)
     density = max(float(counts[(start + np.arange(length)) % SECTORS].sum()) / length, 1e-9)
@@ -75,7 +101,7 @@ def continuation(shell: Shell, radius: float) -> float:
         along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
         shares.append(float(along.sum()) / (reach / width) / density)
     # an edge turns by less than half a turn; of more, both ends would have to go on
-    return max(shares) if closed.sum() <= SECTORS // 2 else min(shares)
+    return (max(shares) if closed.sum() <= SECTORS // 2 else min(shares)), min(shares)
 
 
 def flank(shell: Shell, radius: float) -> float:

@@ -123,6 +123,30 @@ TERMS = (
 )
 
 
+BLEND_BIAS = -3.518
+BLEND_TERMS = (
+    Term("oval", -500.0, 0.00, lambda m: min(m["ovality"], 0.1)),
+    Term("facets", -4.152, 0.03, lambda m: m["facets"]),
+    Term("lack of fit", -1.035, 0.35, _misfit),
+    Term("curvature", 1.854, 1.61, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
+    Term("agreement", 5.415, 0.96, lambda m: m["agreement"]),
+    Term("bulge", -112.0, 0.00, _bulge),
+    Term("bend", -136.0, 0.00, _bend),
+)
+
+
+def weigh_blend(measures: Mapping[str, float]) -> float:
+    """Return the probability that an arc which goes on tangentially on both sides is a piece of a cylinder.
+
+    Parameters
+    ----------
+    measures : mapping of str to float
+        As for `weigh`.
+    """
+    odds = BLEND_BIAS + sum(term.weight * term.value(measures) for term in BLEND_TERMS)
+    return 1.0 / (1.0 + math.exp(-min(max(odds, -50.0), 50.0)))
+
+
 def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     """Weigh the measures of a segment.
 

@@ -29,6 +29,7 @@ FIT_BEYOND_ENDS = 1.02
 POLISH_STEPS = 10
 SOME, LAST_STEPS = 150, 3
 """Points that suffice for the first steps of a polish, and steps with all of them."""
+SHARPEN_STEPS = 12
 SHARP = 0.34
 """Largest spread of a polished candidate over the width of its weights: a Gaussian within it has 0.27 of the width, a
 uniform background 0.378."""
@@ -291,10 +292,35 @@ def polish(
     spread = fit_in_place(xyz, n, model, -math.inf, math.inf, schedule, matrix, right, basis)
     if spread < 0.0 or spread > SHARP * floor or not (least <= model[RADIUS] <= greatest):
         return 0
-    candidate_quality(xyz, n, model, 3.0 * noise, basis, quality)
+    if floor > 3.0 * noise:
+        spread = _sharpen(xyz, n, model, noise, floor, schedule, matrix, right, basis)
+        if spread < 0.0 or not (least <= model[6] <= greatest):
+            return 0
+    candidate_quality(xyz, n, model, 3.0 * max(noise, TUKEY_SPREAD * spread), basis, quality)
     quality[2] = spread
     supported = quality[0] >= min_inliers and quality[0] >= min_share * n and quality[1] >= min_extent
     return 2 if supported else 1
+
+
+@njit(cache=True, nogil=True)
+def _sharpen(
+    xyz: FloatArray,
+    n: int,
+    model: FloatArray,
+    noise: float,
+    width: float,
+    schedule: FloatArray,
+    normal: FloatArray,
+    right: FloatArray,
+    basis: FloatArray,
+) -> float:
+    """Fit a cylinder again under a weight function that narrows to its own scatter, or to the noise; give the spread.
+
+    What meets the surface at an edge lies within a hundredth of a large radius, and bends the fit.
+    """
+    schedule[0], schedule[1], schedule[2] = width, 3.0 * noise, 0.5
+    schedule[3], schedule[4], schedule[5] = TUKEY * TUKEY_SPREAD, 1e-2, SHARPEN_STEPS
+    return float(fit_in_place(xyz, n, model, -math.inf, math.inf, schedule, normal, right, basis))
 
 
 @njit(cache=True, nogil=True)

@@ -18,13 +18,29 @@ CONCENTRIC = 0.85
 """A candidate on the same axis outside this ratio of radii belongs to another surface."""
 LIKE_RADIUS = 0.4
 """A candidate outside this ratio of radii belongs to another object, or to a detail: a rim, a dent, an edge."""
+RISE, LARGEST, ENOUGH_WINDOWS = 8.0, 0.9, 8
+"""A window can tell a rough surface if the surface rises in it by this many deviations, or if it has this size in
+radii; smaller windows count where there are fewer than this many of such."""
+BESIDE = 0.15
+"""A window within this many radii of a surface was laid on it."""
+TOUCHING = 0.25
+"""The axis of a window on a cylinder lies within this many radii of where the radius of the window puts it."""
 AGREEING = 0.15, math.cos(math.radians(6.0)), 0.1
 """A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
 
 
-def least_telling(segment: Segment) -> float:
-    """Return the radius from which a window can identify a cylinder."""
-    return float(LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half))
+def least_telling(segment: Segment, *, rough: bool = False) -> float:
+    """Return the radius from which a window can identify a cylinder.
+
+    Parameters
+    ----------
+    segment : Segment
+    rough : bool
+        Whether the curve of the surface must rise above the scatter of its points.
+    """
+    least = LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half)
+    rising = min(math.sqrt(RISE * segment.spread * segment.radius), LARGEST * segment.radius)
+    return max(least, rising) if rough else least
 
 
 class Neighbourhood:
@@ -39,6 +55,7 @@ class Neighbourhood:
         self._order = np.argsort(candidates.models[:, 0], kind="stable")
         self._models = np.ascontiguousarray(candidates.models[self._order])
         self._windows = candidates.windows[self._order]
+        self._places = np.ascontiguousarray(candidates.places[self._order])
 
     def agreement(self, segment: Segment) -> tuple[int, int]:
         """Count the windows inside a cylinder that agree with it, and all windows inside it.
@@ -53,11 +70,20 @@ class Neighbourhood:
         -------
         consistent, near : int
         """
-        seen = least_telling(segment)
         part = self._beside(segment, segment.half)
-        consistent, near = _count_agreeing(
-            self._models[part], self._windows[part], segment.model, segment.half, seen, *AGREEING
-        )
+        consistent, near = 0, 0
+        for seen in (least_telling(segment, rough=True), least_telling(segment)):
+            consistent, near = _count_agreeing(
+                self._models[part],
+                self._windows[part],
+                self._places[part],
+                segment.model,
+                segment.half,
+                seen,
+                *AGREEING,
+            )
+            if near >= ENOUGH_WINDOWS:
+                break
         return int(consistent), int(near)
 
     def agreeing(
@@ -101,6 +127,8 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
     if abs(height) >= reach or square >= model[RADIUS] * model[RADIUS]:
         return 0
     turn, ratio = row[UX] * model[UX] + row[UY] * model[UY] + row[UZ] * model[UZ], row[RADIUS] / model[RADIUS]
+    if abs(math.sqrt(max(square, 0.0)) - abs(row[RADIUS] - model[RADIUS])) > TOUCHING * model[RADIUS]:
+        return 0  # it belongs to something else inside: axes of surfaces that touch lie as far apart as radii differ
     if square >= (offset * model[RADIUS]) ** 2 or abs(turn) <= cosine:
         return 1 if LIKE_RADIUS < ratio < 1.0 / LIKE_RADIUS else 0
     if abs(ratio - 1.0) < radius:
@@ -109,9 +137,19 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
 
 
 @njit(cache=True, nogil=True)
+def _is_off(place: FloatArray, model: FloatArray, reach: float) -> bool:
+    """Tell of a window whether it was laid elsewhere than on the surface of a cylinder; not if its place is unknown."""
+    dx, dy, dz = place[0] - model[0], place[1] - model[1], place[2] - model[2]
+    height = dx * model[3] + dy * model[4] + dz * model[5]
+    distance = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height))
+    return bool(abs(height) > reach or abs(distance - model[6]) > BESIDE * model[6])
+
+
+@njit(cache=True, nogil=True)
 def _count_agreeing(
     models: FloatArray,
     windows: FloatArray,
+    places: FloatArray,
     model: FloatArray,
     reach: float,
     seen: float,
@@ -121,7 +159,7 @@ def _count_agreeing(
 ) -> tuple[int, int]:
     consistent, near = 0, 0
     for i in range(len(models)):
-        if windows[i] > seen:
+        if windows[i] > seen and not _is_off(places[i], model, reach):
             level = _agrees(models[i], model, reach, offset, cosine, radius)
             near += 1 if level > 0 else 0
             consistent += 1 if level > 1 else 0

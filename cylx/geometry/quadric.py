@@ -141,7 +141,7 @@ def osculating_cylinder(
             return False
         # two standard deviations, from the mean deviation
         width = max(2.5 * noise, 2.5 * _fill_residuals(local, n, width, terms) / count)
-    return _fill_model(terms, center, normal, basis, model)
+    return fill_osculating(terms, center, normal, basis, model)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
@@ -188,7 +188,7 @@ def _fill_residuals(local: FloatArray, n: int, width: float, terms: FloatArray) 
 
 
 @njit(cache=True, nogil=True)
-def _fill_model(
+def fill_osculating(
     terms: FloatArray, center: FloatArray, normal: FloatArray, basis: FloatArray, model: FloatArray
 ) -> bool:
     """Turn the terms of a quadric into the osculating cylinder at the foot of the plane's centre."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from cylx.config import Config
 from cylx.pipeline.assembly import assemble
 from cylx.pipeline.candidates import (
+    candidates_of_patches,
     candidates_of_slices,
     candidates_of_windows,
     cut_slices,
@@ -56,7 +57,9 @@ def extract_cylinders(
         return extract_by_competitor(prepared, log)
     with log.stage("curvature"):
         windows, explained = windows_and_explained(prepared, log)
-        indexed = IndexedCloud.of(prepared.frame, explained.flatness)
+    with log.stage("patches"):
+        patches, normals = candidates_of_patches(prepared, explained, log)
+        indexed = IndexedCloud.of(prepared.frame, explained.flatness, normals)
     with log.stage("slicing"):
         slices = cut_slices(prepared, explained.flatness, log)
     with log.stage("ellipses"):
@@ -64,8 +67,8 @@ def extract_cylinders(
     with log.stage("candidates"):
         of_slices = candidates_of_slices(prepared, ellipses, log)
         local = candidates_of_windows(prepared, explained, log)
-        found = Candidates.joined([windows, of_slices, local])
-        all_windows = Candidates.joined([windows, local]) if len(windows) else found
+        found = Candidates.joined([windows, patches, of_slices, local])
+        all_windows = Candidates.joined([windows, patches, local]) if len(windows) or len(patches) else found
         candidates = select_candidates(prepared, found, log)
     with log.stage("clustering"):
         game = CandidateGame(candidates, prepared.config.clustering, prepared.threads)
@@ -78,5 +81,6 @@ def extract_cylinders(
     rounds.report(log)
     with log.stage("merging"):
         findings = rounds.merge(log)
+        blends = rounds.merge_blends(findings, log)
     with log.stage("labelling"):
-        return assemble(prepared, indexed, findings, rounds.rejected, log.reports)
+        return assemble(prepared, indexed, findings, rounds.rejected, log.reports, blends)

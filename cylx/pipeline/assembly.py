@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cylx.config import Config
 from cylx.fits.likelihood import CONTRADICTION
@@ -33,6 +34,7 @@ def assemble(
     findings: list[Finding],
     rejected: list[RejectedSegment],
     reports: list[StageReport],
+    blends: list[Finding] | None = None,
 ) -> Extraction:
     """Label the points, number the cylinders by confidence, and put everything into scene units.
 
@@ -44,6 +46,8 @@ def assemble(
     rejected : list of RejectedSegment
         What was not accepted, in the order it came.
     reports : list of StageReport
+    blends : list of Finding, optional
+        Arcs that go on tangentially, the most trusted first.
 
     Returns
     -------
@@ -58,18 +62,7 @@ def assemble(
     order = [int(i) for i in np.lexsort((np.arange(len(findings)), -counts, -trust)) if counts[i] > 0]
     squares = np.bincount(labels[labels >= 0], residuals[labels >= 0] ** 2, minlength=len(findings))
     fits = [
-        CylinderFit(
-            frame.to_scene(findings[i].segment.cylinder),
-            int(counts[i]),
-            float(np.sqrt(squares[i] / counts[i])) * frame.spacing,
-            findings[i].coverage,
-            findings[i].support,
-            findings[i].payoff if game else None,
-            findings[i].confidence if verified else None,
-            findings[i].measures,
-            _covariance(findings[i], frame.spacing),
-            _nominal(findings[i], config, frame.spacing),
-        )
+        _fit_of(findings[i], int(counts[i]), float(np.sqrt(squares[i] / counts[i])) * frame.spacing, prepared)
         for i in order
     ]
     number = np.full(len(findings) + 1, -1, np.int32)  # the last entry is what label -1 maps to
@@ -78,9 +71,49 @@ def assemble(
     in_cloud[0][frame.order] = number[labels]
     in_cloud[1][frame.order] = np.where(number[labels] >= 0, residuals * frame.spacing, np.nan)
     warnings = (*_warnings(cloud, scene, fits), *_contradicted(config, fits), *_unlisted(config, fits))
+    arcs = None
+    if blends is not None and verified and config.verification.blends:
+        arcs = tuple(_blends(blends, labels, prepared, indexed))
     lost = [RejectedSegment.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
     shown = tuple(_rejected([*rejected, *lost], frame, indexed, verified=verified, game=game))
-    return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, shown)
+    return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, shown, arcs)
+
+
+def _blends(
+    findings: list[Finding], labels: NDArray[np.int32], prepared: Prepared, indexed: IndexedCloud
+) -> list[CylinderFit]:
+    """Put blends into scene units; a point belongs to the nearest of those that no cylinder has."""
+    frame = prepared.frame
+    owners, residuals = label_points([finding.segment for finding in findings], indexed)
+    owners[labels >= 0] = -1
+    out = []
+    for i, finding in enumerate(findings):
+        own = residuals[owners == i]
+        if len(own):
+            rmse = float(np.sqrt((own**2).mean())) * frame.spacing
+            out.append(_fit_of(finding, len(own), rmse, prepared))
+    return out
+
+
+
+
+def _fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared) -> CylinderFit:
+    """Put a finding into scene units; what its method does not compute is None."""
+    frame, config = prepared.frame, prepared.config
+    game = config.method == "gt"
+    verified = config.verification.enabled and game
+    return CylinderFit(
+        frame.to_scene(finding.segment.cylinder),
+        inliers,
+        rmse,
+        finding.coverage,
+        finding.support,
+        finding.payoff if game else None,
+        finding.confidence if verified else None,
+        finding.measures,
+        _covariance(finding, frame.spacing),
+        _nominal(finding, config, frame.spacing),
+    )
 
 
 def _covariance(finding: Finding, spacing: float) -> FloatArray | None:

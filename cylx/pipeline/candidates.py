@@ -5,6 +5,7 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.lines import are_along
@@ -17,6 +18,7 @@ from cylx.stages.clustering import thin_candidates
 from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
 from cylx.stages.local_slices import slice_windows
+from cylx.stages.patches import find_curved_patches
 from cylx.stages.slicing import cut_slice, draw_planes
 
 LARGE = 6.0
@@ -38,6 +40,20 @@ def windows_and_explained(prepared: Prepared, log: StageLog) -> tuple[Candidates
     if config.slicing.local_planes:  # slices, too, pass over what is flat
         explained.flatness[:] = find_curved_windows(frame, radii, config.candidates, threads)[1].flatness
     return Candidates.joined([]), explained
+
+
+def candidates_of_patches(
+    prepared: Prepared, explained: Explained, log: StageLog
+) -> tuple[Candidates, NDArray[np.float32] | None]:
+    """Propose candidates from the nearest points of each point; also return the normals, if the noise shows them."""
+    frame, config = prepared.frame, prepared.config
+    if "curvature" not in config.candidates.sources:
+        return Candidates.joined([]), None
+    found, normals, report = find_curved_patches(
+        frame, explained, prepared.radii, config.candidates, prepared.threads
+    )
+    log.reports.append(report)
+    return found, normals
 
 
 def cut_slices(prepared: Prepared, flatness: FloatArray, log: StageLog) -> list[Slice | None]:

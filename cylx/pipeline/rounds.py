@@ -14,12 +14,12 @@ from cylx.geometry.arrays import FloatArray
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
-from cylx.stages.averaging import average_cluster, finish, inflation, refine, refit
+from cylx.stages.averaging import average_cluster, finish, inflation, narrow_to_arc, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.extending import extend
 from cylx.stages.measuring import measure_extent
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
-from cylx.stages.verification import verify
+from cylx.stages.verification import Verdict, may_be_arc, verify
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
@@ -150,7 +150,7 @@ class Rounds:
 
     def merge(self, log: StageLog) -> list[Finding]:
         """Join the pieces of one pipe, drop what better cylinders have claimed, and keep as many as asked for."""
-        findings = kept = self.findings
+        findings = kept = [finding for finding in self.findings if not finding.blend]
         joined = claimed = 0
         strayed: list[RejectedSegment] = []
         if self._config.averaging.merge:
@@ -182,6 +182,27 @@ class Rounds:
         log.report("merging", len(findings), len(kept), counts)
         return kept
 
+    def merge_blends(self, cylinders: list[Finding], log: StageLog) -> list[Finding]:
+        """Join the pieces of one blend, and drop those whose points belong to a cylinder or to a better blend.
+
+        Parameters
+        ----------
+        cylinders : list of Finding
+            The merged cylinders.
+        log : StageLog
+        """
+        blends, count = [finding for finding in self.findings if finding.blend], len(self._indexed.points)
+        if not blends:
+            return []
+        distinct = drop_claimed(blends, count, cylinders)
+        pieces = merge_pieces(distinct, self._indexed, self._join_blend)
+        kept = self._over_threads(self._finish, drop_claimed(pieces, count, cylinders))
+        kept = [one for one in kept if not self._out_of_range(one.segment)]
+        joined = len(distinct) - len(pieces)
+        counts = {"joined": joined, "claimed by a better one": len(blends) - joined - len(kept)}
+        log.report("blends", len(blends), len(kept), {reason: n for reason, n in counts.items() if n})
+        return sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))
+
     def _finish(self, finding: Finding) -> Finding:
         """Fit a finding to all its points; up to here a sample of them was enough."""
         inflated = inflation(finding.measures)
@@ -203,7 +224,13 @@ class Rounds:
         """Refit and judge a joined segment in the light of the better of its parts."""
         fitted = refit(segment, self._indexed)
         found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
-        return found if isinstance(found, Finding) else None
+        return found if isinstance(found, Finding) and not found.blend else None
+
+    def _join_blend(self, segment: Segment, best: Finding) -> Finding | None:
+        """Refit and judge a joined blend in the light of the better of its parts."""
+        fitted = refit(segment, self._indexed)
+        found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
+        return found if isinstance(found, Finding) and found.blend else None
 
     def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | RejectedSegment:
         """Verify a segment; what speaks most against it if it does not pass."""
@@ -214,20 +241,39 @@ class Rounds:
         reason, limits = verdict.reason, self._config.verification
         if verdict.measures and not limits.enabled:
             reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""
+        if reason and limits.enabled and limits.blends and may_be_arc(verdict):
+            arc = self._judge_arc(segment, support, payoff)
+            if arc is not None:
+                return arc
         if reason:
             confidence = verdict.confidence if verdict.measures else None
             return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
-        return Finding(
-            segment,
-            verdict.points,
-            support,
-            payoff,
-            verdict.confidence,
-            verdict.coverage,
-            verdict.offset_error,
-            verdict.tilt_error,
-            verdict.measures,
-        )
+        return _finding(segment, verdict, support, payoff)
+
+    def _judge_arc(self, segment: Segment, support: int, payoff: float) -> Finding | None:
+        """Verify a segment as an arc that goes on tangentially; None if it is none."""
+        arc = narrow_to_arc(segment, self._indexed)
+        if isinstance(arc, str) or self._out_of_range(arc):
+            return None
+        counts = self._all_windows.agreement(arc)
+        verdict = verify(arc, self._indexed, payoff, counts, self._config.verification, arc=True)
+        accepted = not verdict.reason and may_be_arc(verdict)
+        return _finding(arc, verdict, support, payoff) if accepted else None
 
     def _out_of_range(self, segment: Segment) -> str:
         return out_of_range(segment, self._prepared.radii, self._config.scene)
+
+
+def _finding(segment: Segment, verdict: Verdict, support: int, payoff: float) -> Finding:
+    return Finding(
+        segment,
+        verdict.points,
+        support,
+        payoff,
+        verdict.confidence,
+        verdict.coverage,
+        verdict.offset_error,
+        verdict.tilt_error,
+        verdict.measures,
+        verdict.blend,
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -63,6 +63,8 @@ class Candidates:
         Points that support it.
     windows : ndarray of shape (M,)
         Radius of the window it was found in.
+    places : ndarray of shape (M, 3)
+        Point of the surface about which its window was laid; NaN where there is none.
     """
 
     models: FloatArray
@@ -70,6 +72,11 @@ class Candidates:
     extents: FloatArray
     inliers: IndexArray
     windows: FloatArray
+    places: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
+
+    def __post_init__(self) -> None:
+        if len(self.places) != len(self.models):
+            object.__setattr__(self, "places", np.full((len(self.models), 3), np.nan))
 
     def __len__(self) -> int:
         return len(self.models)
@@ -92,14 +99,19 @@ class Candidates:
     def take(self, which: IndexArray | MaskArray) -> Candidates:
         """Return the candidates at these indices, or under this mask."""
         return Candidates(
-            self.models[which], self.parents[which], self.extents[which], self.inliers[which], self.windows[which]
+            self.models[which],
+            self.parents[which],
+            self.extents[which],
+            self.inliers[which],
+            self.windows[which],
+            self.places[which],
         )
 
     @classmethod
-    def of_windows(cls, rows: FloatArray, radius: float) -> Candidates:
-        """Make candidates of windows of one radius, each its own parent: rows (M, 9) of model, inliers, extent."""
-        inliers = rows[:, 7].astype(np.int64)
-        return cls(rows[:, :7].copy(), np.arange(len(rows)), rows[:, 8].copy(), inliers, np.full(len(rows), radius))
+    def of_windows(cls, rows: FloatArray, radius: float | FloatArray, places: FloatArray) -> Candidates:
+        """Make candidates of windows, each its own parent: rows (M, 9) of model, inliers, extent."""
+        inliers, radii = rows[:, 7].astype(np.int64), np.full(len(rows), radius, np.float64)
+        return cls(rows[:, :7].copy(), np.arange(len(rows)), rows[:, 8].copy(), inliers, radii, places)
 
     @classmethod
     def joined(cls, parts: Sequence[Candidates]) -> Candidates:
@@ -113,6 +125,7 @@ class Candidates:
             np.concatenate([part.extents for part in parts]),
             np.concatenate([part.inliers for part in parts]),
             np.concatenate([part.windows for part in parts]),
+            np.concatenate([part.places for part in parts]),
         )
 
 

@@ -122,6 +122,8 @@ SMALL_PATCH = 2.0
 ENOUGH_PATCHES = 5
 MOST_NOISE = 4.0
 """No surface is taken for this many times noisier than usual: it would be none."""
+RADIAL = 0.8
+"""Cosine between a normal and the direction from the axis, below which a point is not on a cylinder."""
 TOO_FLAT = 2.0
 """A window this many radii across that is flat shows no cylinder."""
 
@@ -245,16 +247,19 @@ class IndexedCloud:
         Radius of the largest flat window that holds the point, 0 if there is none; frame units.
     noise : Noise
         Frame units.
+    normals : ndarray of shape (N, 3), float32, optional
+        Unit normals, either way, of the points whose nearest neighbours tell it; zero where they do not.
     """
 
     cells: Cells
     flatness: FloatArray
     noise: Noise
+    normals: NDArray[np.float32] | None = None
 
     @classmethod
-    def of(cls, frame: Frame, flatness: FloatArray) -> IndexedCloud:
+    def of(cls, frame: Frame, flatness: FloatArray, normals: NDArray[np.float32] | None = None) -> IndexedCloud:
         """Put the points of a frame into cells."""
-        return cls(Cells(frame.points, frame.codes), flatness, frame.noise)
+        return cls(Cells(frame.points, frame.codes), flatness, frame.noise, normals)
 
     @property
     def points(self) -> FloatArray:
@@ -274,13 +279,38 @@ class IndexedCloud:
             return usual * max(1.0, float(self.noise.factors_at(model[None, POINT])[0]))
         return usual * min(own, MOST_NOISE) if own > 1.2 else usual
 
-    def may_be_on(self, indices: IndexArray, radius: float) -> MaskArray:
-        """Tell which points may lie on a cylinder: those in large flat windows belong to something flatter."""
-        return np.asarray(self.flatness[indices] < self.too_flat(radius), dtype=np.bool_)
+    def may_be_on(self, indices: IndexArray, model: FloatArray, share: float = 1.0) -> MaskArray:
+        """Tell which points may lie on a cylinder (7,).
+
+        Those in large flat windows belong to something flatter; those whose normal is not radial, to what meets it.
+        """
+        may = np.asarray(self.flatness[indices] < share * self.too_flat(model[6]), dtype=np.bool_)
+        if self.normals is not None:
+            _drop_not_radial(self.points, self.normals, indices, model, RADIAL, may)
+        return may
 
     def too_flat(self, radius: float) -> float:
         """Give the flatness from which a point belongs to something flatter than a cylinder of this radius."""
         return TOO_FLAT * radius
+
+
+@njit(cache=True, nogil=True)
+def _drop_not_radial(
+    points: FloatArray,
+    normals: NDArray[np.float32],
+    indices: IndexArray,
+    model: FloatArray,
+    cosine: float,
+    may: MaskArray,
+) -> None:
+    for a in range(len(indices)):
+        i = indices[a]
+        if may[a] and (normals[i, 0] != 0.0 or normals[i, 1] != 0.0 or normals[i, 2] != 0.0):
+            dx, dy, dz = points[i, 0] - model[0], points[i, 1] - model[1], points[i, 2] - model[2]
+            height = dx * model[3] + dy * model[4] + dz * model[5]
+            dx, dy, dz = dx - height * model[3], dy - height * model[4], dz - height * model[5]
+            distance = math.sqrt(dx * dx + dy * dy + dz * dz)
+            may[a] = abs(dx * normals[i, 0] + dy * normals[i, 1] + dz * normals[i, 2]) >= cosine * distance
 
 
 @njit(cache=True, nogil=True)

@@ -38,6 +38,9 @@ class Segment:
         fit.
     choice : Choice, optional
         The entry of a catalogue that was chosen for the radius; None before the last fit, and without a catalogue.
+    flat_share : float
+        Share of the flatness that makes points those of something flatter, from which they are left out here: less
+        than 1 for an arc that goes on into planes.
     """
 
     model: FloatArray
@@ -45,6 +48,7 @@ class Segment:
     spread: float
     covariance: FloatArray | None = None
     choice: Choice | None = None
+    flat_share: float = 1.0
 
     @property
     def point(self) -> FloatArray:
@@ -88,6 +92,8 @@ class Finding:
         Standard deviations of the axis, at its middle and in angle.
     measures : mapping of str to float
         The measures of the verification.
+    blend : bool
+        Whether it is an arc that goes on tangentially, such as a round or a fillet.
     """
 
     segment: Segment
@@ -99,6 +105,7 @@ class Finding:
     offset_error: float
     tilt_error: float
     measures: Mapping[str, float] = field(default_factory=dict)
+    blend: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -259,6 +266,9 @@ class Extraction:
     rejected : tuple of RejectedFit
         The rejected cylinders, ordered by confidence, then inliers, descending; those not measured come last. Near
         copies of one rejected segment may occur more than once.
+    blends : tuple of CylinderFit or None
+        Arcs that go on tangentially: rounds, fillets, slot ends. Ordered as the cylinders; their inliers are the points
+        on their surface that no cylinder has. None if blends were not asked for.
     """
 
     cylinders: tuple[CylinderFit, ...]
@@ -270,6 +280,7 @@ class Extraction:
     config: Config
     warnings: tuple[str, ...] = ()
     rejected: tuple[RejectedFit, ...] = ()
+    blends: tuple[CylinderFit, ...] | None = None
 
     def __repr__(self) -> str:
         count = len(self.cylinders)

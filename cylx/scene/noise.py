@@ -12,12 +12,22 @@ from numba import njit
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.morton import BITS, cell_starts, gather_ball
 from cylx.geometry.numerics import sort_in_place
-from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
+from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, finest_mode, half_sample_mode, quadric_spread
 
 NEIGHBOURHOODS_SAMPLED = 3000
 """Neighbourhoods looked at; the mode of their noise then scatters by about 4 %."""
 NEIGHBOURS = (48, 96, 192)
 """Sizes of a neighbourhood: the next is taken where the patch is not wide against its thickness."""
+FINE = 16
+"""Size of the smallest neighbourhood: larger ones cross the edges of small features."""
+MOSTLY = 0.7
+"""Share of the smallest neighbourhoods that must be wide for them to tell the noise."""
+FINER = 0.8
+"""The noise is that of the smallest neighbourhoods if it is less than this share of that of the others."""
+FILAMENT = 0.3
+"""A neighbourhood whose narrower direction is less than this share of its width is a curve, and no surface."""
+LEAST_NOISE = 1e-3
+"""Noise of a surface without any, in spacings: below it nothing is told apart."""
 THICK = (384, 768, 1536, 3072, 6144)
 """Sizes that are tried of a cloud whose noise is so many spacings that few of the patches are wide."""
 FEW_WIDE = 0.2
@@ -115,16 +125,42 @@ def measure_surface(
     flawless = np.isfinite(spread).any()
     clear = good & flat
     cores = deviation[np.isfinite(deviation)]
-    noise = 1e-3 * typical  # noise-free surfaces still have a scale below which nothing is told apart
+    noise = LEAST_NOISE * typical  # noise-free surfaces still have a scale below which nothing is told apart
     if not good.any() and not flawless:
         noise = max(noise, thickness)  # of the largest patches, which do not look like surfaces; so it is at least that
     if good.any():
-        plain, robust = half_sample_mode(spread[good]), half_sample_mode(cores + 1e-12 * typical)
+        plain, robust = finest_mode(spread[good], LEAST_NOISE * typical), half_sample_mode(cores + 1e-12 * typical)
         # heavy outliers blow up the plain estimate alone
         noise = max(noise, robust / MAD_SHRINKAGE if robust < 0.85 * MAD_SHRINKAGE * plain else plain)
+    if noise > LEAST_NOISE * typical:
+        fine = _noise_of_fine(points, cells, starts, unit * 2.0**level, sample, LEAST_NOISE * typical, threads)
+        noise = fine if fine is not None and fine < FINER * noise else noise
+    if good.any():
         # the scatter of a patch has its outliers; what it says of its place is how it compares with that of others
         spread = spread * (noise / plain)
     return float(typical), float(dense), float(noise), Patches(sample[clear], spread[clear], size_of[clear])
+
+
+def _noise_of_fine(
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    sample: IndexArray,
+    least: float,
+    threads: int,
+) -> float | None:
+    """Give the noise over the smallest neighbourhoods; None if few of them are pieces of a surface."""
+    size = min(FINE, len(points) - 1)
+    if size < 9:
+        return None
+    near, _ = _nearest(points, cells, starts, side, sample, size, threads)
+    sd, width, narrow = quadric_spread(points[near])
+    surface = narrow > FILAMENT * width
+    wide = surface & (width > WIDE_PATCH * sd)
+    if wide.sum() < max(MOSTLY * surface.sum(), FEW_WIDE * len(sample)):
+        return None  # of thick patches only the thinnest are wide
+    return finest_mode(sd[wide], least)
 
 
 @njit(cache=True, nogil=True)

@@ -30,6 +30,21 @@ def half_sample_mode(values: FloatArray) -> float:
     return float(np.exp(logs.mean()))
 
 
+FINEST = 3.0, 0.15
+"""A mode this many times lower, of so large a share of the patches, is that of the surfaces; the other one is edges."""
+
+
+def finest_mode(values: FloatArray, least: float) -> float:
+    """Give the lowest mode that a good share of the values has; what is below `least` counts as that."""
+    kept = np.maximum(values, least)
+    mode = half_sample_mode(kept)
+    while True:
+        lower = kept[kept * FINEST[0] < mode]
+        if len(lower) < max(FINEST[1] * len(values), 4):
+            return mode
+        mode = half_sample_mode(lower)
+
+
 def quadric_spread(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit a quadric over the plane of each patch by least squares.
 

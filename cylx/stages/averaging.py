@@ -45,8 +45,8 @@ MOST_RADIUS_RATIO = 2.0
 """A fit whose radius changes more than this has left the candidates it came from."""
 LEAST_POINTS_OF_AVERAGE = 20
 """Without so many points five parameters are not fitted robustly."""
-SHORTEST_HALF = 0.1
-"""A cylinder has at least this half height, in radii."""
+SHORTEST_HALF = 0.02
+"""A cylinder has at least this half height, in radii: what is shorter is a circle."""
 SETTLED = 0.01
 """Growth ends when half the height changes less than this share of itself and of the radius."""
 SHELL_OF_FIT, LEAST_SHELL_OF_FIT = 4.0, 0.02
@@ -69,6 +69,10 @@ STRUCTURED_LACK_OF_FIT = 1.4
 """A lack of fit (chi-square per cell) beyond this is none by chance."""
 WIDEST_IN_LAST_FIT = 8.0
 """Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
+MOST_FORM = 0.04
+"""Scatter that a surface may have whatever the noise, as a share of the radius."""
+ARC_FLAT, ARC_STEPS = 0.2, 4
+"""Points of flat windows of this share of what is too flat are not of an arc, and so many fits settle it."""
 LEAST_COSINE = math.cos(math.radians(25.0))
 """A fit whose axis turns further than this has left the candidates it came from."""
 
@@ -151,7 +155,8 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
         if not alike or abs(model[DIRECTION] @ first[DIRECTION]) < LEAST_COSINE:
             return "drifted away"
         spread = TUKEY_SPREAD * spread
-        heights, angles = points_on(points, model, SURFACE_WIDTH * min(max(spread, noise), MOST_SPREAD * noise))
+        most = max(MOST_SPREAD * noise, MOST_FORM * model[RADIUS])
+        heights, angles = points_on(points, model, SURFACE_WIDTH * min(max(spread, noise), most))
         found = visible_extent(heights, angles, half, model[RADIUS], doubt=DOUBT_INSIDE if step else 1.0)
         if found is None:
             return "too few points"
@@ -188,7 +193,31 @@ def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> S
         return "no fit"
     model, spread = fit
     model[RADIUS] = unbiased_radius(model[RADIUS], min(spread, 0.5 * model[RADIUS]))
-    return Segment(model, segment.half, spread)
+    return replace(segment, model=model, spread=spread, covariance=None, choice=None)
+
+
+def narrow_to_arc(segment: Segment, indexed: IndexedCloud) -> Segment | str:
+    """Fit a cylinder again without the points of the planes that it goes on into.
+
+    An arc between two planes that touch it takes some of their points within the noise, and its radius comes out too
+    large.
+
+    Parameters
+    ----------
+    segment : Segment
+    indexed : IndexedCloud
+
+    Returns
+    -------
+    Segment or str
+        The arc, or why there is none.
+    """
+    narrowed: Segment | str = replace(segment, flat_share=ARC_FLAT)
+    for _ in range(ARC_STEPS):
+        if isinstance(narrowed, str):
+            break
+        narrowed = refit(narrowed, indexed, most=ENOUGH_TO_JUDGE)
+    return narrowed
 
 
 def inflation(measures: Mapping[str, float]) -> float:
@@ -261,7 +290,7 @@ def finish(
     else:
         if prior is not None:
             likely = fit_mixture(points, model, **limits, prior=prior) or likely
-        free = Segment(likely.model, segment.half, spread, likely.covariance)
+        free = replace(segment, model=likely.model, spread=spread, covariance=likely.covariance, choice=None)
     if catalogue is None:
         return free
     choice = choose_entry(free.radius, math.sqrt(inflated * likely.covariance[4, 4]), catalogue)
@@ -273,11 +302,11 @@ def finish(
     snapping = (prior or Prior())._replace(radius=nominal, radius_deviation=tolerance)
     snapped = None if robust else fit_mixture(points, model, **limits, prior=snapping)
     if snapped is not None:
-        return Segment(snapped.model, segment.half, spread, snapped.covariance, choice)
+        return replace(free, model=snapped.model, spread=spread, covariance=snapped.covariance, choice=choice)
     start = free.model.copy()
     _turn_as_given(start)
     moved, covariance = given_radius(start, likely.covariance, nominal, tolerance)
-    return Segment(moved, segment.half, free.spread, covariance, choice)
+    return replace(free, model=moved, covariance=covariance, choice=choice)
 
 
 def _turn_as_given(model: FloatArray) -> None:
@@ -289,7 +318,8 @@ def _turn_as_given(model: FloatArray) -> None:
 def _shell(segment: Segment, indexed: IndexedCloud, most: int | None) -> tuple[FloatArray, float]:
     """Give the points about the surface of a segment, and how near to it those lie that have a say at first."""
     width = max(SHELL_OF_FIT * indexed.noise_about(segment.model, segment.half), LEAST_SHELL_OF_FIT * segment.radius)
-    return _own_points(indexed, segment.model, FIT_BEYOND_ENDS * segment.half, 2.0 * width, most), width
+    end = FIT_BEYOND_ENDS * segment.half
+    return _own_points(indexed, segment.model, end, 2.0 * width, most, segment.flat_share), width
 
 
 def _robust_fit(
@@ -308,6 +338,10 @@ def _own_points(
     indexed: IndexedCloud, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
 ) -> FloatArray:
     """Give the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
-    return indexed.cells.surface_points(
-        model, half, width, most, indexed.flatness, strict * indexed.too_flat(model[RADIUS])
-    )
+    limit = strict * indexed.too_flat(model[RADIUS])
+    if indexed.normals is None:
+        return indexed.cells.surface_points(model, half, width, most, indexed.flatness, limit)
+    radius = float(model[RADIUS])
+    near = indexed.cells.near_cylinder(model, -half, half, max(0.0, radius - width), radius + width)
+    near = near[indexed.may_be_on(near, model) & (indexed.flatness[near] < limit)]
+    return indexed.points[near[:: max(1, len(near) // most) if most else 1]]

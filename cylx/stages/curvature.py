@@ -71,7 +71,7 @@ def find_curved_windows(
         flat = outcome == 1
         if flat.any():
             _mark_flat(frame, scale, seeds[flat], planes[flat], explained.flatness)
-        parts.append(Candidates.of_windows(rows[outcome == 5], radius))
+        parts.append(Candidates.of_windows(rows[outcome == 5], radius, scale.points[seeds[outcome == 5]]))
     found = Candidates.joined(parts)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:5], counts[:5], strict=True) if n}
     return found, explained, StageReport("curvature", int(counts.sum()), len(found), rejected)

@@ -79,7 +79,7 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
         return None
     outer = model[RADIUS] + max(0.5 * model[RADIUS], 10.0 * noise)
     near = indexed.cells.near_cylinder(model, -reach, reach, 0.0, outer)
-    near = near[indexed.may_be_on(near, model[RADIUS])]
+    near = near[indexed.may_be_on(near, model)]
     heights, residuals, _ = coordinates_of(indexed.points, near, model)
     astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
     fresh = (np.abs(heights) > half) & (np.abs(residuals) < 3.0 * noise + 2.0 * astray)

@@ -58,6 +58,6 @@ def surface_points(segment: Segment, indexed: IndexedCloud) -> tuple[IndexArray,
     near = indexed.cells.near_cylinder(
         segment.model, -segment.half, segment.half, max(0.0, radius - reach), radius + reach
     )
-    near = near[indexed.may_be_on(near, radius)]
+    near = near[indexed.may_be_on(near, segment.model, segment.flat_share)]
     _, distances, angles = cylinder_coordinates(indexed.points[near], segment.point, segment.direction)
     return near, distances - radius, angles

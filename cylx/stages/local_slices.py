@@ -82,7 +82,8 @@ def slice_windows(
         stride = max(1, math.ceil(len(seeds) / config.windows))
         rows, counts = _look(frame, scale, seeds[::stride], radius_range, config.local_planes, supported, seed, threads)
         totals += counts
-        parts.append(Candidates.of_windows(rows[rows[:, 7] > 0], radius))
+        good = rows[:, 7] > 0
+        parts.append(Candidates.of_windows(rows[good], radius, scale.points[seeds[::stride][good]]))
     return Candidates.joined(parts), dict(zip(COUNTS, totals.tolist(), strict=True))
 
 

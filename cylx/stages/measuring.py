@@ -43,7 +43,7 @@ def measure_extent(segment: Segment, indexed: IndexedCloud) -> Segment | str:
     heights = distances = np.empty(0)
     for _ in range(DOUBLINGS):
         near = indexed.cells.near_cylinder(model, -reach, reach, max(0.0, radius - width), radius + width)
-        near = near[indexed.may_be_on(near, radius)]
+        near = near[indexed.may_be_on(near, model)]
         heights, distances, angles = cylinder_coordinates(indexed.points[near], model[POINT], model[DIRECTION])
         found = visible_extent(heights, angles, half, radius)
         if found is None:

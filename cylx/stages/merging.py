@@ -129,7 +129,7 @@ def is_part_of(segment: Segment, known: FloatArray) -> bool:
     return bool(((apart < MOST_OFFSET_OF_THE_SAME * known[:, RADIUS]) & along).any())
 
 
-def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
+def drop_claimed(findings: list[Finding], count: int, before: list[Finding] | None = None) -> list[Finding]:
     """Drop the cylinders most of whose points belong to better ones.
 
     Parameters
@@ -137,8 +137,12 @@ def drop_claimed(findings: list[Finding], count: int) -> list[Finding]:
     findings : list of Finding
     count : int
         Points of the cloud.
+    before : list of Finding, optional
+        What has claimed its points already.
     """
     claimed = np.zeros(count, np.bool_)
+    for finding in before or []:
+        claimed[finding.points] = True
     kept = []
     for finding in sorted(findings, key=lambda finding: (-len(finding.points) * finding.payoff, -len(finding.points))):
         if claimed[finding.points].mean() <= MOST_CLAIMED_SHARE:
@@ -163,7 +167,7 @@ def _is_bridged(indexed: IndexedCloud, model: FloatArray, half: float, width: fl
     """Return whether points lie on a cylinder about its middle, and almost none beside its surface."""
     reach = model[RADIUS] + max(0.5 * model[RADIUS], 4.0 * width)
     near = indexed.cells.near_cylinder(model, -half, half, 0.0, reach)
-    _, residuals, _ = coordinates_of(indexed.points, near[indexed.may_be_on(near, model[RADIUS])], model)
+    _, residuals, _ = coordinates_of(indexed.points, near[indexed.may_be_on(near, model)], model)
     on = np.abs(residuals) < width
     areas = 4.0 * model[RADIUS] * width, reach**2 - 4.0 * model[RADIUS] * width
     about = float((~on).sum()) * areas[0] / areas[1]

@@ -12,15 +12,27 @@ from dataclasses import dataclass
 import numpy as np
 
 from cylx.config import VerificationConfig
-from cylx.evidence.measures import TRUNCATED, distinct_places, lack_of_fit, look_at, shape_of
+from cylx.evidence.measures import (
+    TRUNCATED,
+    deviations_of_form,
+    distinct_places,
+    facets,
+    look_at,
+    own_scatter,
+    shape_of,
+)
 from cylx.evidence.surroundings import continuation, emptiness, flank
-from cylx.evidence.weights import weigh
+from cylx.evidence.weights import weigh, weigh_blend
 from cylx.geometry.arrays import IndexArray
 from cylx.geometry.coverage import covered_angle
 from cylx.records import IndexedCloud, Segment
 
 LEAST_POINTS_TO_MEASURE = 20
 """Points on the surface without which nothing can be measured."""
+GOES_ON = 0.25
+"""Density of points past an end of an arc, as a share of its own, from which it goes on tangentially."""
+LEAST_SHARE = 1e-4
+"""Deviation of form that is of no account, as a share of the radius."""
 ENOUGH_TO_MEASURE = 20000
 """Points on the surface that suffice for the measures."""
 
@@ -43,6 +55,8 @@ class Verdict:
         Indices of the points within three deviations of the surface that may belong to it.
     offset_error, tilt_error : float
         Standard deviations of the axis, at its middle and in angle: frame units, radians.
+    blend : bool
+        Whether it is accepted as an arc that goes on tangentially on both sides; `confidence` is that it is one, then.
     """
 
     reason: str
@@ -52,6 +66,7 @@ class Verdict:
     points: IndexArray
     offset_error: float = math.inf
     tilt_error: float = math.inf
+    blend: bool = False
 
 
 def verify(
@@ -60,6 +75,8 @@ def verify(
     payoff: float,
     counts: tuple[int, int],
     config: VerificationConfig,
+    *,
+    arc: bool = False,
 ) -> Verdict:
     """Measure a segment and judge it.
 
@@ -74,6 +91,8 @@ def verify(
     counts : tuple of int
         Candidates of windows along it that agree with it, and all of them.
     config : VerificationConfig
+    arc : bool
+        Judge it as an arc that goes on tangentially.
 
     Returns
     -------
@@ -89,18 +108,30 @@ def verify(
     noise = indexed.noise_about(segment.model, segment.half)
     deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
     shape = shape_of(shell, segment, deviation)
-    lack, structure = lack_of_fit(shell, deviation)
+    form = deviations_of_form(shell, deviation)
+    structure = form["structure"]
+    tangent, both = continuation(shell, radius)
     inside, outside = emptiness(shell, radius)
     consistent, near = counts
     along = math.copysign(1.0, segment.direction[np.abs(segment.direction).argmax()])  # as the result has it
+    scatter = own_scatter(shell, radius, segment.half, coverage)
+    least = LEAST_SHARE * radius
     measures = {
+        "scatter_radii": scatter / radius,
+        "form_radii": math.sqrt(max(deviation**2 - scatter**2, 0.0)) / radius,
+        "roughness": math.hypot(deviation, least) / math.hypot(scatter, least),
         "noise_ratio": deviation / noise,
-        "lack_of_fit": lack,
+        "lack_of_fit": form["lack_of_fit"],
         "structure": structure / noise,
         "structure_radii": structure / radius,
+        "ovality": form["ovality"] / radius,
+        "explained": form["explained"],
+        "facets": facets(shell, indexed.flatness, radius, deviation),
+        "deviation_radii": deviation / radius,
         "inside": inside,
         "outside": outside,
-        "tangent": continuation(shell, radius),
+        "tangent": tangent,
+        "tangent_both": both,
         "flank": flank(shell, radius),
         "places": distinct_places(shell.angles[shell.on], radius, deviation),
         "curvature": shape["curvature"],
@@ -115,12 +146,21 @@ def verify(
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
     }
-    probability, worst = weigh({**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff})
+    known = {**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff}
+    probability, worst = weigh(known)
     confidence = round(probability, 3)  # further digits would order equals by chance
-    reason = broken_limit(measures, len(points), coverage, config) or (
-        "" if confidence >= config.min_confidence else worst
-    )
-    return Verdict(reason, confidence, measures, coverage, points, shape["offset_error"], shape["tilt_error"])
+    reason = broken_limit(measures, len(points), coverage, config)
+    errors = shape["offset_error"], shape["tilt_error"]
+    if arc:
+        confidence = round(weigh_blend(known), 3)
+    if not reason and confidence < config.min_confidence:
+        reason = worst
+    return Verdict(reason, confidence, measures, coverage, points, *errors, blend=arc)
+
+
+def may_be_arc(verdict: Verdict) -> bool:
+    """Tell whether a segment goes on tangentially past an end of its arc."""
+    return verdict.measures.get("tangent", 0.0) >= GOES_ON
 
 
 def broken_limit(measures: dict[str, float], count: int, coverage: float, config: VerificationConfig) -> str:
@@ -128,8 +168,12 @@ def broken_limit(measures: dict[str, float], count: int, coverage: float, config
     limits = {
         "too few points": count < config.min_inliers,
         "coverage": coverage < math.radians(config.min_coverage_deg),
-        "height": measures["height_radii"] < config.min_height,
-        "slope": abs(measures["slope"]) > config.max_slope + 3.0 * measures["slope_error"],
-        "bulge": abs(measures["bulge"]) > config.max_bulge + 3.0 * measures["bulge_error"],
+        "height": measures["height_radii"] < (config.min_height or 0.0),
+        "slope": abs(measures["slope"]) - 3.0 * measures["slope_error"] > _limit(config.max_slope),
+        "bulge": abs(measures["bulge"]) - 3.0 * measures["bulge_error"] > _limit(config.max_bulge),
     }
     return next((name for name, broken in limits.items() if broken), "")
+
+
+def _limit(value: float | None) -> float:
+    return math.inf if value is None else value
