@@ -95,8 +95,6 @@ def _blends(
     return out
 
 
-
-
 def _fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared) -> CylinderFit:
     """Put a finding into scene units; what its method does not compute is None."""
     frame, config = prepared.frame, prepared.config

@@ -49,9 +49,7 @@ def candidates_of_patches(
     frame, config = prepared.frame, prepared.config
     if "curvature" not in config.candidates.sources:
         return Candidates.joined([]), None
-    found, normals, report = find_curved_patches(
-        frame, explained, prepared.radii, config.candidates, prepared.threads
-    )
+    found, normals, report = find_curved_patches(frame, explained, prepared.radii, config.candidates, prepared.threads)
     log.reports.append(report)
     return found, normals
 
