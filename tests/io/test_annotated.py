@@ -157,7 +157,7 @@ def test_faces_are_dropped_and_lists_of_points_are_kept(tmp_path, annotate):
 
 
 def test_many_rows_are_written_piece_by_piece(annotate, monkeypatch):
-    monkeypatch.setattr("cylx.io.annotated.BLOCK", 7)
+    monkeypatch.setattr("cylx.io.annotated.ROWS_AT_A_TIME", 7)
     points = np.random.default_rng(0).normal(size=(50, 3))
     points[3] = np.nan
     rows = annotate(PointCloud.from_array(points))
