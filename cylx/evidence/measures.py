@@ -26,8 +26,8 @@ SPARSE = 0.2
 """Where there is less than this share of the usual density, points lie between lines."""
 BESIDE, LEAST_FREEDOM = 6.0, 8
 """Points whose mean each is compared with, and degrees of freedom without which that tells nothing."""
-FLAT_RISE = 8.0
-"""A flat window may hide so many deviations of a curve."""
+FLAT_RISE = 6.0
+"""A flat window may hide a curve that rises by so many times the scatter."""
 FLAT_LEAST = 0.02
 """And this share of the radius at least."""
 LINE_SHARE = 0.1
@@ -293,9 +293,9 @@ def _left_over(terms: list[FloatArray], weights: FloatArray, values: FloatArray)
     return float(((values - design @ fitted) ** 2).sum())
 
 
-def facets(shell: Shell, flatness: FloatArray, radius: float, deviation: float) -> float:
+def facets(shell: Shell, flatness: FloatArray, radius: float, scatter: float) -> float:
     """Return the share of the surface that lies in flat windows so wide that a cylinder would curve out of them."""
     own = flatness[shell.indices[shell.on]]
     if len(own) == 0:
         return 0.0
-    return float((own * own > 2.0 * radius * max(FLAT_RISE * deviation, FLAT_LEAST * radius)).mean())
+    return float((own * own > 2.0 * radius * max(FLAT_RISE * scatter, FLAT_LEAST * radius)).mean())

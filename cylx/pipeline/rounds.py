@@ -241,7 +241,7 @@ class Rounds:
         reason, limits = verdict.reason, self._config.verification
         if verdict.measures and not limits.enabled:
             reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""
-        if reason and limits.enabled and limits.blends and may_be_arc(verdict):
+        if limits.enabled and limits.blends and may_be_arc(verdict, surely=not reason):
             arc = self._judge_arc(segment, support, payoff)
             if arc is not None:
                 return arc

@@ -31,6 +31,8 @@ LEAST_POINTS_TO_MEASURE = 20
 """Points on the surface without which nothing can be measured."""
 GOES_ON = 0.25
 """Density of points past an end of an arc, as a share of its own, from which it goes on tangentially."""
+SURELY_GOES_ON = 0.5
+"""The same, past one end alone, of what would pass for a cylinder."""
 LEAST_SHARE = 1e-4
 """Deviation of form that is of no account, as a share of the radius."""
 ENOUGH_TO_MEASURE = 20000
@@ -126,7 +128,7 @@ def verify(
         "structure_radii": structure / radius,
         "ovality": form["ovality"] / radius,
         "explained": form["explained"],
-        "facets": facets(shell, indexed.flatness, radius, deviation),
+        "facets": facets(shell, indexed.flatness, radius, scatter),
         "deviation_radii": deviation / radius,
         "inside": inside,
         "outside": outside,
@@ -158,9 +160,17 @@ def verify(
     return Verdict(reason, confidence, measures, coverage, points, *errors, blend=arc)
 
 
-def may_be_arc(verdict: Verdict) -> bool:
-    """Tell whether a segment goes on tangentially past an end of its arc."""
-    return verdict.measures.get("tangent", 0.0) >= GOES_ON
+def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:
+    """Tell whether a segment goes on tangentially past an end of its arc.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    surely : bool
+        Whether it would pass for a cylinder otherwise: then it must go on at both ends, or as densely as the arc.
+    """
+    one, both = verdict.measures.get("tangent", 0.0), verdict.measures.get("tangent_both", 0.0)
+    return (both >= GOES_ON or one >= SURELY_GOES_ON) if surely else one >= GOES_ON
 
 
 def broken_limit(measures: dict[str, float], count: int, coverage: float, config: VerificationConfig) -> str:
