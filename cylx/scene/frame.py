@@ -19,6 +19,7 @@ from cylx.geometry.morton import BITS, morton_codes
 from cylx.records import Frame, Noise, Scene, cell_keys, stream
 from cylx.scene.noise import measure_surface
 from cylx.scene.noise_variation import noise_by_place, noise_by_size
+from cylx.scene.scan_lines import points_on_surfaces
 
 STRAY = 40.0
 """A cloud may have strays (a few points far away) if its width is this many times the deviation from its mean."""
@@ -119,7 +120,8 @@ def measure_scene(points: FloatArray, seed: int = 0) -> Scene:
     Scene
     """
     ordered, _, codes, unit = canonical_order(points)
-    spacing, _, noise, _ = measure_surface(ordered, codes, unit, stream(seed, "scene"))
+    surface = points_on_surfaces(ordered, codes, unit)
+    spacing, _, noise, _ = measure_surface(ordered[surface], codes[surface], unit, stream(seed, "scene"))
     return Scene(spacing, noise, extent_of(points))
 
 
@@ -144,10 +146,12 @@ def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Fr
     """
     ordered, order, codes, unit = canonical_order(points)
     rng = stream(config.seed, "scene")
-    spacing, dense, measured, patches = measure_surface(ordered, codes, unit, rng, threads)
+    surface = points_on_surfaces(ordered, codes, unit, threads)
+    on, their_codes = ordered[surface], codes[surface]
+    spacing, dense, measured, patches = measure_surface(on, their_codes, unit, rng, threads)
     noise = config.scene.noise or measured
     with ThreadPoolExecutor(1) as pool:  # measures the noise over larger pieces while the points are sorted
-        measuring = pool.submit(noise_by_size, ordered, codes, unit, spacing, measured, rng, threads)
+        measuring = pool.submit(noise_by_size, on, their_codes, unit, spacing, measured, rng, threads)
         dense *= (config.scene.spacing or spacing) / spacing
         spacing = config.scene.spacing or spacing
         scene = Scene(spacing, noise, extent_of(points))
@@ -160,7 +164,7 @@ def make_frame(points: FloatArray, config: Config, threads: int = 1) -> tuple[Fr
         unit = max(voxel / 2.0**level, side / (2.0**BITS - 2))  # coarser for a cloud wider than 2^21 voxels
         codes = morton_codes(ordered, unit, side)
         again = np.argsort(codes, kind="stable")
-        places, ratios = ordered[patches.middles], patches.deviations / measured
+        places, ratios = ordered[surface[patches.middles]], patches.deviations / measured
         cell, cells, factors = noise_by_place(places, ratios, side)
         keys = cell_keys(cells)
         by_key = np.argsort(keys)

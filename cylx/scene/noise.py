@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray
-from cylx.geometry.morton import BITS, cell_starts, gather_ball
-from cylx.geometry.numerics import sort_in_place
-from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, finest_mode, half_sample_mode, quadric_spread
+from cylx.geometry.morton import BITS, cell_starts
+from cylx.scene.neighbours import nearest_points
+from cylx.scene.noise_patches import (
+    MAD_SHRINKAGE,
+    core_spread,
+    finest_mode,
+    half_sample_mode,
+    quadric_spread,
+)
+from cylx.scene.scan_lines import spreads_of_rods
 
 NEIGHBOURHOODS_SAMPLED = 3000
 """Neighbourhoods looked at; the mode of their noise then scatters by about 4 %."""
@@ -24,6 +29,8 @@ MOSTLY = 0.7
 """Share of the smallest neighbourhoods that must be wide for them to tell the noise."""
 FINER = 0.8
 """The noise is that of the smallest neighbourhoods if it is less than this share of that of the others."""
+THICK_NOISE = 0.3
+"""Noise in spacings from which it may be the thickness of rods that are seen all round."""
 FILAMENT = 0.3
 """A neighbourhood whose narrower direction is less than this share of its width is a curve, and no surface."""
 LEAST_NOISE = 1e-3
@@ -104,7 +111,7 @@ def measure_surface(
             enough = 0.5 * len(todo)
         if size < 9:
             continue
-        near, radius = _nearest(points, cells, starts, unit * 2.0**level, sample[todo], size, threads)
+        near, radius = nearest_points(points, cells, starts, unit * 2.0**level, sample[todo], size, threads)
         sd, width, narrow = quadric_spread(points[near])
         wide = width > WIDE_PATCH * sd
         if count in THICK:
@@ -132,13 +139,32 @@ def measure_surface(
         plain, robust = finest_mode(spread[good], LEAST_NOISE * typical), half_sample_mode(cores + 1e-12 * typical)
         # heavy outliers blow up the plain estimate alone
         noise = max(noise, robust / MAD_SHRINKAGE if robust < 0.85 * MAD_SHRINKAGE * plain else plain)
-    if noise > LEAST_NOISE * typical:
-        fine = _noise_of_fine(points, cells, starts, unit * 2.0**level, sample, LEAST_NOISE * typical, threads)
-        noise = fine if fine is not None and fine < FINER * noise else noise
+    noise = _finer(noise, points, cells, starts, unit * 2.0**level, sample, typical, threads)
     if good.any():
         # the scatter of a patch has its outliers; what it says of its place is how it compares with that of others
         spread = spread * (noise / plain)
     return float(typical), float(dense), float(noise), Patches(sample[clear], spread[clear], size_of[clear])
+
+
+def _finer(
+    noise: float,
+    points: FloatArray,
+    cells: IndexArray,
+    starts: IndexArray,
+    side: float,
+    sample: IndexArray,
+    typical: float,
+    threads: int,
+) -> float:
+    """Return the noise of the smallest neighbourhoods, or of rods, where it is clearly less than that of the others."""
+    if noise > LEAST_NOISE * typical:
+        fine = _noise_of_fine(points, cells, starts, side, sample, LEAST_NOISE * typical, threads)
+        noise = fine if fine is not None and fine < FINER * noise else noise
+    if noise > THICK_NOISE * typical:
+        spreads = spreads_of_rods(points, cells, starts, side, sample[::4], threads)
+        rods = finest_mode(spreads, LEAST_NOISE * typical) if len(spreads) else noise
+        noise = rods if rods < FINER * noise else noise
+    return noise
 
 
 def _noise_of_fine(
@@ -154,72 +180,10 @@ def _noise_of_fine(
     size = min(FINE, len(points) - 1)
     if size < 9:
         return None
-    near, _ = _nearest(points, cells, starts, side, sample, size, threads)
+    near, _ = nearest_points(points, cells, starts, side, sample, size, threads)
     sd, width, narrow = quadric_spread(points[near])
     surface = narrow > FILAMENT * width
     wide = surface & (width > WIDE_PATCH * sd)
     if wide.sum() < max(MOSTLY * surface.sum(), FEW_WIDE * len(sample)):
         return None  # of thick patches only the thinnest are wide
     return finest_mode(sd[wide], least)
-
-
-@njit(cache=True, nogil=True)
-def _balls(
-    points: FloatArray,
-    cells: IndexArray,
-    starts: IndexArray,
-    side: float,
-    sample: IndexArray,
-    size: int,
-    near: IndexArray,
-    radius: FloatArray,
-) -> None:
-    room = np.empty(len(points) if len(points) < 20000 else 20000, np.int64)
-    squares, ordered = np.empty(len(points)), np.empty(len(points))
-    for s in range(len(sample)):
-        center = points[sample[s]]
-        reach, found = side, room
-        n = gather_ball(points, cells, starts, side, center, reach, found)
-        while n <= size:
-            reach *= 1.5
-            if reach > 12.0 * side:  # far from most others: there are more cells about it than points
-                n, found = len(points), np.empty(len(points), np.int64)
-                for i in range(n):
-                    found[i] = i
-            else:
-                n = gather_ball(points, cells, starts, side, center, reach, found)
-        for a in range(n):
-            i = found[a]
-            squares[a] = (
-                (points[i, 0] - center[0]) ** 2 + (points[i, 1] - center[1]) ** 2 + (points[i, 2] - center[2]) ** 2
-            )
-            ordered[a] = squares[a]
-        sort_in_place(ordered, n)
-        k = 0
-        for strictly in (True, False):  # of points equally far, those that come first
-            for a in range(n):
-                if k <= size and (squares[a] < ordered[size] if strictly else squares[a] == ordered[size]):
-                    near[s, k] = found[a]
-                    k += 1
-        radius[s] = math.sqrt(ordered[size])
-
-
-def _nearest(
-    points: FloatArray,
-    cells: IndexArray,
-    starts: IndexArray,
-    side: float,
-    sample: IndexArray,
-    size: int,
-    threads: int,
-) -> tuple[IndexArray, FloatArray]:
-    """Give the `size` nearest neighbours of each sample point, itself among them, and the distance of the last."""
-    near, radius = np.empty((len(sample), size + 1), np.int64), np.empty(len(sample))
-
-    def work(part: slice) -> None:
-        _balls(points, cells, starts, side, sample[part], size, near[part], radius[part])
-
-    step = -(-len(sample) // threads)
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, [slice(first, first + step) for first in range(0, len(sample), step)]))
-    return near, radius

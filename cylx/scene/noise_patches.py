@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray, MaskArray
 
@@ -62,6 +63,54 @@ def quadric_spread(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatAr
     residuals = _residuals(design, height, np.ones_like(height))
     count = patches.shape[1]
     return np.sqrt((residuals**2).mean(axis=1) * count / (count - 6)), width, narrow
+
+
+ROUND = 0.3
+"""A cross-section is a circle if its points scatter about it by less than this share of its radius."""
+ALL_ROUND = 0.5
+"""Length of the mean direction from the middle to the points: 0 all round, 0.64 for half a circle."""
+SLIM = 0.4
+"""A piece of a rod is less wide than this share of its length."""
+
+
+def rod_spread(long: FloatArray, near: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Fit a circle to the cross-section of each piece of a rod.
+
+    Parameters
+    ----------
+    long : ndarray of shape (m, k, 3)
+        Pieces that tell the direction of the rods.
+    near : ndarray of shape (m, n, 3)
+        Pieces at the same places whose points are fitted.
+
+    Returns
+    -------
+    deviations : ndarray of shape (m,)
+        Standard deviation about the circle, n - 3 degrees of freedom.
+    rods : ndarray of shape (m,), bool
+        Whether a piece is slim, and its cross-section a circle rather than a blot.
+
+    References
+    ----------
+    I. Kasa, A circle fitting procedure and its error analysis, IEEE Trans. Instrum. Meas. 25 (1976).
+    """
+    offsets = long - long.mean(axis=1, keepdims=True)
+    variances, axes = np.linalg.eigh(offsets.transpose(0, 2, 1) @ offsets)
+    slim = np.sqrt(np.maximum(variances[:, 1], 0.0)) < SLIM * np.sqrt(variances[:, 2])
+    x, y = ((near - near.mean(axis=1, keepdims=True)) @ axes[:, :, :2]).transpose(2, 0, 1)
+    design = np.stack([x, y, np.ones_like(x)], axis=-1)
+    gram = design.transpose(0, 2, 1) @ design
+    gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    terms = np.linalg.solve(gram, design.transpose(0, 2, 1) @ (x * x + y * y)[..., None])[..., 0]
+    middle = 0.5 * terms[:, :2]
+    radius = np.sqrt(np.maximum(terms[:, 2] + (middle**2).sum(axis=1), 0.0))
+    x, y = x - middle[:, :1], y - middle[:, 1:]
+    distances = np.hypot(x, y)
+    residuals = distances - radius[:, None]
+    aside = np.hypot((x / (distances + 1e-300)).mean(axis=1), (y / (distances + 1e-300)).mean(axis=1))
+    spread = np.sqrt((residuals**2).sum(axis=1) / (near.shape[1] - 3))
+    length = np.sqrt(variances[:, 2] / long.shape[1])
+    return spread, slim & (spread < ROUND * radius) & (radius < length) & (aside < ALL_ROUND)
 
 
 def core_spread(patches: FloatArray) -> FloatArray:
