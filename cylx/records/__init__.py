@@ -18,6 +18,7 @@ from cylx.records.cylinders import (
     RejectedFit,
     RejectedSegment,
     Segment,
+    Side,
 )
 from cylx.records.progress import Observer, SilentObserver, StageReport
 from cylx.records.scales import CELL, Explained, Scale
@@ -46,6 +47,7 @@ __all__ = [
     "Scene",
     "Segment",
     "Selection",
+    "Side",
     "SilentObserver",
     "Slice",
     "Source",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,12 @@ from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, Cylinder
 from cylx.records.clouds import PointCloud, Scene
 from cylx.records.progress import StageReport
 from cylx.records.shown import html_in_notebook
+from cylx.wording import counted
 
 if TYPE_CHECKING:
     from cylx.config import Config
+
+Side = Literal["convex", "concave", "unknown"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,6 +202,10 @@ class CylinderFit:
         radians. None if it was not computed.
     nominal : NominalRadius or None
         Its entry of the catalogue; None without a catalogue or a covariance.
+    form : float or None
+        Scatter that neighbouring points share, the surface's own deviation from a cylinder, scene units.
+    side : str or None
+        `convex` for a pin, `concave` for a bore, or `unknown`. Both are None if they were not measured.
     """
 
     cylinder: Cylinder
@@ -211,6 +218,8 @@ class CylinderFit:
     evidence: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = None
     nominal: NominalRadius | None = None
+    form: float | None = None
+    side: Side | None = None
 
     @property
     def radius_sd(self) -> float | None:
@@ -283,8 +292,7 @@ class Extraction:
     blends: tuple[CylinderFit, ...] | None = None
 
     def __repr__(self) -> str:
-        count = len(self.cylinders)
-        return f"{count} cylinder{'' if count == 1 else 's'} in {len(self.labels)} points"
+        return f"{counted(len(self.cylinders), len(self.blends or ()))} in {len(self.labels)} points"
 
     def _repr_html_(self) -> str:
         return html_in_notebook(self)
