@@ -18,13 +18,15 @@ from cylx.geometry.coverage import SECTORS, sector_of
 from cylx.geometry.cylinder import coordinates_of
 from cylx.records import IndexedCloud, Segment, Side
 
-RIM, RIM_RADII = 3.0, 0.25
-"""Points of a cap or a plate lie this near to the rim: spacings, or radii if that is more."""
+RIM, RIM_RADII, WIDTH_RADII = 3.0, 0.25, 0.1
+"""Points of a cap or a plate lie this near to the rim: spacings, or radii along and across the axis if that is more."""
+ONLY_THERE = 0.5
+"""Beside the surface away from the rim, there are fewer than this share of as many points per height."""
 MOST_SECTORS, FILLED = 0.6, 0.2
 """A cap or a plate fills this share of the covered sectors, each to this share of the density on the surface."""
 MIDDLE = 0.8
 """Share of the height in which other things are looked for, away from caps and plates."""
-MANY, FEW = 0.05, 0.01
+MANY, FEW = 0.02, 0.005
 """Things are there from the first share of the points on the surface on, and nothing is there up to the second."""
 LEAST_POINTS = 10
 """Fewer points are no thing, and no surface."""
@@ -110,9 +112,18 @@ def _adjoins(around: _Around, end: int, way: int) -> bool:
     unit = 1.0 / math.sqrt(around.density)  # the spacing on this surface, of the points that are looked at
     thick = max(around.gap, RIM * unit)
     past = end * around.heights - around.half
-    band = (past > -min(thick, around.half)) & (past < max(thick, RIM_RADII * around.radius))
-    width = max(RIM * unit, RIM_RADII * around.radius)
-    return _fills(around, band, way, width)
+    thick = min(thick, around.half)
+    band = (past > -thick) & (past < max(RIM * unit, thick, RIM_RADII * around.radius))
+    width = max(RIM * unit, WIDTH_RADII * around.radius)
+    if not _fills(around, band, way, width):
+        return False
+    # a wall beside the surface is there at all heights
+    room = min(around.half - thick, 2.0 * thick)
+    off = way * around.residuals
+    ring = (off > around.gap) & (off < around.gap + width)
+    beside = float((ring & (past < -thick) & (past > -thick - room)).sum())
+    at_rim = float((ring & (np.abs(past) < thick)).sum())
+    return room < 0.5 * thick or beside / room < ONLY_THERE * max(at_rim, 1.0) / (2.0 * thick)
 
 
 def _goes_on(around: _Around, way: int) -> bool:

@@ -203,9 +203,9 @@ class CylinderFit:
     nominal : NominalRadius or None
         Its entry of the catalogue; None without a catalogue or a covariance.
     form : float or None
-        Scatter that neighbouring points share, the surface's own deviation from a cylinder, scene units.
-    side : str or None
-        `convex` for a pin, `concave` for a bore, or `unknown`. Both are None if they were not measured.
+        Deviation of the surface from a cylinder, that neighbouring points share, scene units; None if not measured.
+    side : {'convex', 'concave', 'unknown'} or None
+        That of a pin, that of a bore, or neither can be told; None if not measured.
     """
 
     cylinder: Cylinder
@@ -277,7 +277,7 @@ class Extraction:
         copies of one rejected segment may occur more than once.
     blends : tuple of CylinderFit or None
         Arcs that go on tangentially: rounds, fillets, slot ends. Ordered as the cylinders; their inliers are the points
-        on their surface that no cylinder has. None if blends were not asked for.
+        that no cylinder has. None if they were not looked for.
     """
 
     cylinders: tuple[CylinderFit, ...]
