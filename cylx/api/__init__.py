@@ -150,10 +150,9 @@ def extract(
         cloud = read_cloud(Path(points_or_path), scan=scan)
     elif scan is not None:
         raise ValueError("scan needs a file, and an array was given")
-    elif isinstance(points_or_path, PointCloud):
-        cloud = points_or_path
     else:
-        cloud = PointCloud.from_array(points_or_path)
+        given = points_or_path
+        cloud = given if isinstance(given, PointCloud) else PointCloud.from_array(given)
     observer = observer or SilentObserver()
     compile_kernels(observer)
     return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)

@@ -8,7 +8,7 @@ so they tell nothing.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -16,7 +16,9 @@ from cylx.evidence.measures import scatter_of
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.coverage import SECTORS, sector_of
 from cylx.geometry.cylinder import coordinates_of
-from cylx.records import IndexedCloud, Segment, Side
+from cylx.records import IndexedCloud, Segment
+
+Side = Literal["convex", "concave", "unknown"]
 
 RIM, RIM_RADII, WIDTH_RADII = 3.0, 0.25, 0.1
 """Points of a cap or a plate lie this near to the rim: spacings, or radii along and across the axis if that is more."""

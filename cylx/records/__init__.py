@@ -18,7 +18,6 @@ from cylx.records.cylinders import (
     RejectedFit,
     RejectedSegment,
     Segment,
-    Side,
 )
 from cylx.records.progress import Observer, SilentObserver, StageReport
 from cylx.records.scales import CELL, Explained, Scale
@@ -47,7 +46,6 @@ __all__ = [
     "Scene",
     "Segment",
     "Selection",
-    "Side",
     "SilentObserver",
     "Slice",
     "Source",

@@ -21,8 +21,6 @@ from cylx.wording import counted
 if TYPE_CHECKING:
     from cylx.config import Config
 
-Side = Literal["convex", "concave", "unknown"]
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segment:
@@ -219,7 +217,7 @@ class CylinderFit:
     covariance: FloatArray | None = None
     nominal: NominalRadius | None = None
     form: float | None = None
-    side: Side | None = None
+    side: Literal["convex", "concave", "unknown"] | None = None
 
     @property
     def radius_sd(self) -> float | None:
