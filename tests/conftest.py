@@ -104,7 +104,7 @@ def make_extraction():
 
 @pytest.fixture
 def fake_pipeline(monkeypatch, make_extraction):
-    """Put a pipeline in place that answers at once; `calls` has what it was asked, `found` and `blends` are what it finds."""
+    """Put a pipeline in place that answers at once; `calls` has what it was asked, `found` and `blends` its answer."""
 
     class FakePipeline:
         def __init__(self):

@@ -34,7 +34,7 @@ LEAST_POINTS = 10
 """Fewer points are no thing, and no surface."""
 MORE_THAN_HALF_DEG = 200.0
 """Covered angle from which things inside and outside count: arcs of half a turn go on outside on either side."""
-SLENDER = 4.0
+SLENDER = 6.0
 """Plates at both ends of a cylinder longer than this, in radii, may be floor and ceiling, and it a column."""
 WALL, WALL_SHARE = 0.05, 0.5
 """A wall about the same axis is so thick at most, in radii, and holds this share of the points on its side."""

@@ -49,7 +49,7 @@ def side(*parts, half=1.0, turn_deg=360.0, turned=None, scale=1.0):
     up = np.array([0.0, 0.0, 1.0])
     if turned is not None:
         points, up = points @ turned.T, turned @ up
-    points = points + [7.0, -3.0, 2.0]
+    points = points + np.array([7.0, -3.0, 2.0])
     frame, _ = make_frame(points, Config())
     noise = Noise(np.ones(1), np.array([scale * SIGMA / frame.spacing]))
     indexed = IndexedCloud(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
@@ -64,7 +64,9 @@ PLATES = (ring(-1.0, 1.0, 4.0), ring(1.0, 1.0, 4.0))
 
 KINDS = {
     "can": ((wall(-1, 1), *CAPS), {}, "convex"),
-    "half a can": ((wall(-1, 1, turn_deg=180), ring(1.0, 0, 1, 180), ring(-1.0, 0, 1, 180)), {"turn_deg": 180.0}, "convex"),
+    "half a can": (
+        (wall(-1, 1, turn_deg=180), ring(1.0, 0, 1, 180), ring(-1.0, 0, 1, 180)), {"turn_deg": 180.0}, "convex"
+    ),
     "disc": ((wall(-0.1, 0.1), ring(-0.1, 0, 1), ring(0.1, 0, 1)), {"half": 0.1}, "convex"),
     "through bore in a plate": ((wall(-1, 1), *PLATES), {}, "concave"),
     "hole in a sheet": ((wall(-0.1, 0.1), ring(-0.1, 1, 4), ring(0.1, 1, 4)), {"half": 0.1}, "concave"),
@@ -73,18 +75,26 @@ KINDS = {
     "pin on a plate with a cap": ((wall(-1, 1), PLATES[0], CAPS[1]), {}, "unknown"),
     "bare pipe": ((wall(-1, 1),), {}, "unknown"),
     "bare long pipe": ((wall(-6, 6),), {"half": 6.0}, "unknown"),
-    "groove in a shaft": ((wall(-1, 1), ring(-1, 1, 1.4), ring(1, 1, 1.4), wall(1, 3, 1.4), wall(-3, -1, 1.4)), {}, "unknown"),
-    "flange on a shaft": ((wall(-1, 1), ring(-1, 0.5, 1), ring(1, 0.5, 1), wall(1, 3, 0.5), wall(-3, -1, 0.5)), {}, "unknown"),
+    "groove in a shaft": (
+        (wall(-1, 1), ring(-1, 1, 1.4), ring(1, 1, 1.4), wall(1, 3, 1.4), wall(-3, -1, 1.4)), {}, "unknown"
+    ),
+    "flange on a shaft": (
+        (wall(-1, 1), ring(-1, 0.5, 1), ring(1, 0.5, 1), wall(1, 3, 0.5), wall(-3, -1, 0.5)), {}, "unknown"
+    ),
     "outer wall of a tube": ((wall(-1, 1), wall(-1, 1, 0.8), ring(-1, 0.8, 1), ring(1, 0.8, 1)), {}, "convex"),
     "inner wall of a tube": ((wall(-1, 1), wall(-1, 1, 1.2), ring(-1, 1, 1.2), ring(1, 1, 1.2)), {}, "concave"),
     "tube without rims": ((wall(-1, 1), wall(-1, 1, 0.8)), {}, "unknown"),
-    "column between floor and ceiling": ((wall(-4, 4), ring(-4, 1, 4), ring(4, 1, 4)), {"half": 4.0}, "unknown"),
+    "column between floor and ceiling": ((wall(-5, 5), ring(-5, 1, 4), ring(5, 1, 4)), {"half": 5.0}, "unknown"),
     "stem on the ground beside a bush": ((wall(-4, 4), ring(-4, 1, 4), things(-1, 1, 1.8)), {"half": 4.0}, "convex"),
     "pipe beside things": ((wall(-4, 4), things(-1, 1, 1.8)), {"half": 4.0}, "convex"),
     "tunnel with things in it": ((wall(-4, 4), things(-1, 1, 0.4)), {"half": 4.0}, "concave"),
-    "pipe with things in and about it": ((wall(-4, 4), things(-1, 1, 0.4), things(-1, 1, 1.8)), {"half": 4.0}, "unknown"),
+    "pipe with things in and about it": (
+        (wall(-4, 4), things(-1, 1, 0.4), things(-1, 1, 1.8)), {"half": 4.0}, "unknown"
+    ),
     "tank with things in it": ((wall(-1, 1), *CAPS, things(-1, 1, 0.4)), {}, "unknown"),
-    "half a pipe beside things": ((wall(-4, 4, turn_deg=150), things(-1, 1, 1.8)), {"half": 4.0, "turn_deg": 150.0}, "unknown"),
+    "half a pipe beside things": (
+        (wall(-4, 4, turn_deg=150), things(-1, 1, 1.8)), {"half": 4.0, "turn_deg": 150.0}, "unknown"
+    ),
 }  # fmt: skip
 
 
