@@ -77,7 +77,7 @@ def make_extraction():
     from cylx.geometry.cylinder import Cylinder
     from cylx.records import CylinderFit, Extraction, PointCloud, RejectedFit, Scene, StageReport
 
-    def make(cloud=None, config=None, *, cylinders=2, rejected=1):
+    def make(cloud=None, config=None, *, cylinders=2, rejected=1, blends=None):
         cloud = PointCloud(POINTS) if cloud is None else cloud
         shapes = [Cylinder((0, 0, 2), (0, 0, 1), i + 1.0, 4.0) for i in range(cylinders)]
         fits = [
@@ -85,6 +85,7 @@ def make_extraction():
             for i, shape in enumerate(shapes)
         ]
         refused = CylinderFit(Cylinder((1, 0, 0), (0, 1, 0), 0.5, 1.0), 7, 0.125, np.pi, 3, 0.5)
+        arcs = [Cylinder((3 + 2 * i, 0, 2), (0, 0, 1), 0.5, 4.0) for i in range(blends or 0)]
         return Extraction(
             cylinders=tuple(fits),
             labels=np.full(len(cloud.points), 0 if fits else -1, np.int32),
@@ -95,6 +96,7 @@ def make_extraction():
             config=config or Config(),
             warnings=("made by hand",),
             rejected=(RejectedFit(refused, "agreement"),) * rejected,
+            blends=None if blends is None else tuple(CylinderFit(arc, 5, 0.25, np.pi / 2, 3, 0.5) for arc in arcs),
         )
 
     return make
@@ -102,11 +104,11 @@ def make_extraction():
 
 @pytest.fixture
 def fake_pipeline(monkeypatch, make_extraction):
-    """Put a pipeline in place that answers at once; `calls` has what it was asked, `found` is what it finds."""
+    """Put a pipeline in place that answers at once; `calls` has what it was asked, `found` and `blends` its answer."""
 
     class FakePipeline:
         def __init__(self):
-            self.calls, self.found = [], 2
+            self.calls, self.found, self.blends = [], 2, None
 
         def __call__(self, cloud, config, *, threads=None, observer=None):
             self.calls.append((cloud, config, threads))
@@ -115,7 +117,7 @@ def fake_pipeline(monkeypatch, make_extraction):
             observer.stage_finished("slicing", 0.5)
             if isinstance(self.found, BaseException):
                 raise self.found
-            return make_extraction(cloud, config, cylinders=self.found)
+            return make_extraction(cloud, config, cylinders=self.found, blends=self.blends)
 
     fake = FakePipeline()
     monkeypatch.setattr("cylx.pipeline.extract_cylinders", fake)

@@ -58,7 +58,7 @@ def test_options_are_those_of_the_command(asked, tmp_path):
     (tmp_path / "my.yaml").write_text("preset: paper\nslicing: {min_points: 9}")
     options = {"seed": 3, "radius": (None, 2.0), "max_cylinders": 4, "planes": 7, "overrides": ["slicing.thickness=1"]}
     options |= {"axis": "y", "axis_tolerance_deg": 5.0, "axis_sd_deg": 0.5, "min_coverage_deg": 60}
-    options |= {"known_radius": (1.5, 0.01)}
+    options |= {"known_radius": (1.5, 0.01), "blends": False}
     cylx.extract([[0, 0, 0]], config=tmp_path / "my.yaml", threads=2, **options)
     cylx.extract([[0, 0, 0]], catalogue=[{"name": "DN50", "radius": 0.03}, 0.05])
     assert asked[1][1].scene.catalogue == [CatalogueEntry(name="DN50", radius=0.03), CatalogueEntry(radius=0.05)]
@@ -76,6 +76,7 @@ def test_options_are_those_of_the_command(asked, tmp_path):
             "scene.known_radius": 1.5,
             "scene.known_radius_sd": 0.01,
             "verification.min_coverage_deg": 60,
+            "verification.blends": False,
         },
     )
     assert asked[0][1] == expected
@@ -125,8 +126,9 @@ def test_an_extraction_as_arrays(make_extraction):
     assert {array.shape for array in make_extraction(cylinders=0).to_arrays().values()} == {(0, 3), (0,)}
 
 
-def test_an_extraction_as_an_object_is_what_the_command_writes(make_extraction, tmp_path):
-    found = make_extraction()
+@pytest.mark.parametrize("blends", [None, 0, 2])
+def test_an_extraction_as_an_object_is_what_the_command_writes(make_extraction, tmp_path, blends):
+    found = make_extraction(blends=blends)
     assert cylx.to_dict(found) == cylx.Result.of(found).to_object()
     (tmp_path / "r.json").write_text(cylx.Result.of(found).to_json(), encoding="utf-8")
     assert cylx.read_result(tmp_path / "r.json").to_object() == cylx.to_dict(found)

@@ -38,6 +38,7 @@ def extract(
     known_radius: tuple[float, float | None] | None = None,
     catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
+    blends: bool | None = None,
     crop: Crop | None = None,
     voxel: float | None = None,
     every: int | None = None,
@@ -82,6 +83,9 @@ def extract(
         in the configuration, or just radii. The one that a fit supports becomes its prior.
     min_coverage_deg : float, optional
         Smallest angle of the surface that must be seen, about the axis, degrees.
+    blends : bool, optional
+        Whether to look for arcs that go on tangentially, such as rounds and fillets; they are in `Extraction.blends`.
+        By default as configured, and that is yes.
     crop : pair of triples of float or None, optional
         Smallest and largest coordinates of the points to use; None sets no bound.
     voxel : float, optional
@@ -130,6 +134,7 @@ def extract(
         known_radius=known_radius,
         catalogue=catalogue,
         min_coverage_deg=min_coverage_deg,
+        blends=blends,
     )
     settings = load_config(
         path=None if config is None or isinstance(config, Config) else Path(config),
@@ -145,10 +150,9 @@ def extract(
         cloud = read_cloud(Path(points_or_path), scan=scan)
     elif scan is not None:
         raise ValueError("scan needs a file, and an array was given")
-    elif isinstance(points_or_path, PointCloud):
-        cloud = points_or_path
     else:
-        cloud = PointCloud.from_array(points_or_path)
+        given = points_or_path
+        cloud = given if isinstance(given, PointCloud) else PointCloud.from_array(given)
     observer = observer or SilentObserver()
     compile_kernels(observer)
     return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)

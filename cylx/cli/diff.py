@@ -10,6 +10,7 @@ import click
 from cylx.cli.options.configuration import complete_files, debug_option, json_option
 from cylx.cli.terminal.failures import answer, called_by_file
 from cylx.cli.terminal.group import ExampleCommand
+from cylx.wording import counted
 
 if TYPE_CHECKING:
     from cylx.evaluation import Difference
@@ -36,9 +37,9 @@ _TOLERANCE = click.FloatRange(min=0)
 @json_option
 @debug_option
 def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
-    """Compare the cylinders of the results A and B within tolerances.
+    """Compare the cylinders and the blends of the results A and B within tolerances.
 
-    The order of the cylinders does not matter. The exit code is 0 if the results agree and 1 if not; the differences
+    Their order does not matter. The exit code is 0 if the results agree and 1 if not; the differences
     are shown.
     """
     from cylx.cli.terminal.display import show_table
@@ -54,13 +55,14 @@ def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
         header = ["what", "id in A", "id in B", "of", "A", "B", "difference", "tolerance"]
         show_table(header, [_row(difference) for difference in comparison.differences])
     else:
-        answer(f"the same {comparison.matched} cylinder{'' if comparison.matched == 1 else 's'}\n")
+        answer(f"the same {counted(comparison.matched, comparison.blends_matched)}\n")
     if not comparison.same:
         raise click.exceptions.Exit(1)
 
 
 def _row(difference: Difference) -> list[str]:
     """Format one row of the table."""
-    ids = ["" if number is None else str(number) for number in (difference.id_a, difference.id_b)]
+    prefix = "" if difference.of == "cylinders" else "blend "
+    ids = ["" if number is None else f"{prefix}{number}" for number in (difference.id_a, difference.id_b)]
     values = (difference.a, difference.b, difference.difference, difference.tolerance)
     return [difference.kind, *ids, difference.what, *("" if v is None else f"{v:.6g}" for v in values)]

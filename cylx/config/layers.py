@@ -85,6 +85,7 @@ def named_options(
     known_radius: tuple[float, float | None] | None = None,
     catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
+    blends: bool | None = None,
 ) -> dict[str, object]:
     """Return the dotted keys for the named options of the command line and of `cylx.extract`.
 
@@ -108,6 +109,8 @@ def named_options(
         Nominal radii: a file, entries as in the configuration, or just radii, scene units.
     min_coverage_deg : float, optional
         Smallest angle about the axis that must be covered, degrees.
+    blends : bool, optional
+        Whether arcs that go on tangentially are looked for.
 
     Returns
     -------
@@ -135,6 +138,7 @@ def named_options(
         "scene.known_radius_sd": known_sd,
         "scene.catalogue": None if catalogue is None else entries_of(catalogue),
         "verification.min_coverage_deg": min_coverage_deg,
+        "verification.blends": blends,
     }
     return {key: value for key, value in values.items() if value is not None}
 

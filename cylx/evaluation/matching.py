@@ -86,37 +86,39 @@ class PairErrors:
     shift: FloatArray
 
 
-def read_cylinders(document: Mapping[str, object], place: str) -> CylinderTable:
+def read_cylinders(document: Mapping[str, object], place: str, key: str = "cylinders") -> CylinderTable:
     """Read the cylinders of a JSON object.
 
     Parameters
     ----------
     document : mapping
-        With a list `cylinders` of objects.
+        With a list of objects.
     place : str
         Name of the document in errors.
+    key : str
+        Key of the list; only `cylinders` must be there.
 
     Raises
     ------
     InputError
         If a key is missing or has a value of the wrong kind; the place is dotted, as in `truth.cylinders[3].radius`.
     """
-    entries = document.get("cylinders") if isinstance(document, Mapping) else None
+    entries = document.get(key, None if key == "cylinders" else ()) if isinstance(document, Mapping) else None
     if not isinstance(entries, list | tuple):
-        raise InputError(place, "has no list 'cylinders'", "give a result of 'cylx extract', or a truth in its form")
+        raise InputError(place, f"has no list '{key}'", "give a result of 'cylx extract', or a truth in its form")
     n = len(entries)
     vectors, numbers, ids = np.full((2, n, 3), np.nan), np.full((3, n), np.nan), []
     ignore = np.zeros(n, dtype=bool)
     for i, entry in enumerate(entries):
-        here = f"{place}.cylinders[{i}]"
+        here = f"{place}.{key}[{i}]"
         if not isinstance(entry, Mapping):
             raise InputError(here, "is not an object", "give each cylinder as an object with its keys")
         vectors[0, i] = _vector(entry, "axis_point", here)
         vectors[1, i] = _vector(entry, "axis_direction", here)
         numbers[0, i] = _number(entry.get("radius"), f"{here}.radius")
-        for row, key in ((1, "height"), (2, "inliers")):
-            if entry.get(key) is not None:
-                numbers[row, i] = _number(entry[key], f"{here}.{key}")
+        for row, name in ((1, "height"), (2, "inliers")):
+            if entry.get(name) is not None:
+                numbers[row, i] = _number(entry[name], f"{here}.{name}")
         ids.append(_identity(entry.get("id", i), f"{here}.id"))
         ignore[i] = bool(entry.get("ignore", False))
     lengths = np.linalg.norm(vectors[1], axis=1, keepdims=True)
@@ -124,11 +126,11 @@ def read_cylinders(document: Mapping[str, object], place: str) -> CylinderTable:
     return CylinderTable(tuple(ids), vectors[0], directions, numbers[0], numbers[1], numbers[2], ignore)
 
 
-def require_usable(table: CylinderTable, place: str) -> None:
+def require_usable(table: CylinderTable, place: str, key: str = "cylinders") -> None:
     """Raise an InputError unless all cylinders have a finite axis and a radius > 0."""
     bad = ~(table.usable & (table.radii > 0))
     if bad.any():
-        here = f"{place}.cylinders[{int(bad.argmax())}]"
+        here = f"{place}.{key}[{int(bad.argmax())}]"
         raise InputError(here, "has no finite axis or no radius > 0", "correct its numbers, or leave it out")
 
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Literal
+from dataclasses import asdict, dataclass, fields, replace
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from cylx.evaluation.matching import (
 from cylx.geometry.arrays import FloatArray
 
 Kind = Literal["missing", "extra", "moved", "resized", "recounted"]
+List = Literal["cylinders", "blends"]
 
 _SAME_ANGLE_DEG = 5.0  # within these limits two cylinders count as the same, with different parameters
 _SAME_OFFSET = 0.25
@@ -68,11 +69,14 @@ class Difference:
     id_a, id_b : int or None
         The cylinder in a and in b.
     what : str
-        `cylinder`, `angle_deg`, `offset`, `shift` (along the axis), `height`, `radius` or `inliers`.
+        `cylinder` or `blend` if one is missing or extra, or `angle_deg`, `offset`, `shift` (along the axis), `height`,
+        `radius` or `inliers`.
     a, b : float or None
         The values in a and b, if there are any; the radius of a missing or extra cylinder.
     difference, tolerance : float or None
         The difference and its tolerance, in the same unit.
+    of : str
+        The list they are in, `cylinders` or `blends`.
     """
 
     kind: Kind
@@ -83,6 +87,7 @@ class Difference:
     b: float | None = None
     difference: float | None = None
     tolerance: float | None = None
+    of: List = "cylinders"
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,13 +99,19 @@ class Comparison:
     cylinders_a, cylinders_b, matched : int
         Number of cylinders in a, in b, and in both.
     differences : tuple of Difference
-        In the order of a, with those only in b last; empty if the results are the same.
+        Those of the cylinders and then those of the blends, in the order of a, with those only in b last; empty if the
+        results are the same.
+    blends_a, blends_b, blends_matched : int
+        Number of blends in a, in b, and in both.
     """
 
     cylinders_a: int
     cylinders_b: int
     matched: int
     differences: tuple[Difference, ...]
+    blends_a: int = 0
+    blends_b: int = 0
+    blends_matched: int = 0
 
     @property
     def same(self) -> bool:
@@ -114,19 +125,24 @@ class Comparison:
             "cylinders_a": self.cylinders_a,
             "cylinders_b": self.cylinders_b,
             "matched": self.matched,
+            "blends_a": self.blends_a,
+            "blends_b": self.blends_b,
+            "blends_matched": self.blends_matched,
             "differences": [asdict(difference) for difference in self.differences],
         }
 
 
 def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tolerances = Tolerances()) -> Comparison:
-    """Compare the cylinders of two results, in any order.
+    """Compare the cylinders of two results, in any order, and so their blends.
+
+    A result without a list of blends counts as one without blends.
 
     Heights and inliers are compared if both results have them. A difference equal to its tolerance is allowed.
 
     Parameters
     ----------
     a, b : mapping
-        JSON objects with a list `cylinders`.
+        JSON objects with a list `cylinders`, and perhaps a list `blends`.
     tolerances : Tolerances
         The allowed differences.
 
@@ -135,9 +151,24 @@ def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tol
     InputError
         If either is malformed, or a cylinder is not finite.
     """
-    left, right = read_cylinders(a, "a"), read_cylinders(b, "b")
-    require_usable(left, "a")
-    require_usable(right, "b")
+    found = _compare_lists(a, b, "cylinders", tolerances)
+    blends = _compare_lists(a, b, "blends", tolerances)
+    return Comparison(*found.counts, (*found.differences, *blends.differences), *blends.counts)
+
+
+class _Compared(NamedTuple):
+    """The numbers of entries in a, in b and in both, and the differences."""
+
+    counts: tuple[int, int, int]
+    differences: list[Difference]
+
+
+def _compare_lists(a: Mapping[str, object], b: Mapping[str, object], of: List, tolerances: Tolerances) -> _Compared:
+    """Compare one list of two results."""
+    left, right = read_cylinders(a, "a", of), read_cylinders(b, "b", of)
+    require_usable(left, "a", of)
+    require_usable(right, "b", of)
+    name = of.removesuffix("s")
     errors = _mutual_errors(left, right)
     pairs = _same_cylinders(left, right, errors, tolerances)
     differences: list[Difference] = []
@@ -146,11 +177,11 @@ def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tol
             differences += _differences(left, right, (i, pairs[i]), errors, tolerances)
         else:
             lost = float(left.radii[i])
-            differences.append(Difference(kind="missing", id_a=id_a, id_b=None, what="cylinder", a=lost))
+            differences.append(Difference(kind="missing", id_a=id_a, id_b=None, what=name, a=lost))
     for j in sorted(set(range(len(right))) - set(pairs.values())):
         new = float(right.radii[j])
-        differences.append(Difference(kind="extra", id_a=None, id_b=right.ids[j], what="cylinder", b=new))
-    return Comparison(len(left), len(right), len(pairs), tuple(differences))
+        differences.append(Difference(kind="extra", id_a=None, id_b=right.ids[j], what=name, b=new))
+    return _Compared((len(left), len(right), len(pairs)), [replace(one, of=of) for one in differences])
 
 
 def _mutual_errors(left: CylinderTable, right: CylinderTable) -> PairErrors:

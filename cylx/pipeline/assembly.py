@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import Config
+from cylx.evidence.side import side_of
 from cylx.fits.likelihood import CONTRADICTION
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.coverage import covered_angle
@@ -62,7 +63,7 @@ def assemble(
     order = [int(i) for i in np.lexsort((np.arange(len(findings)), -counts, -trust)) if counts[i] > 0]
     squares = np.bincount(labels[labels >= 0], residuals[labels >= 0] ** 2, minlength=len(findings))
     fits = [
-        _fit_of(findings[i], int(counts[i]), float(np.sqrt(squares[i] / counts[i])) * frame.spacing, prepared)
+        _fit_of(findings[i], int(counts[i]), float(np.sqrt(squares[i] / counts[i])) * frame.spacing, prepared, indexed)
         for i in order
     ]
     number = np.full(len(findings) + 1, -1, np.int32)  # the last entry is what label -1 maps to
@@ -91,11 +92,11 @@ def _blends(
         own = residuals[owners == i]
         if len(own):
             rmse = float(np.sqrt((own**2).mean())) * frame.spacing
-            out.append(_fit_of(finding, len(own), rmse, prepared))
+            out.append(_fit_of(finding, len(own), rmse, prepared, indexed))
     return out
 
 
-def _fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared) -> CylinderFit:
+def _fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared, indexed: IndexedCloud) -> CylinderFit:
     """Put a finding into scene units; what its method does not compute is None."""
     frame, config = prepared.frame, prepared.config
     game = config.method == "gt"
@@ -111,7 +112,15 @@ def _fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared) -> 
         finding.measures,
         _covariance(finding, frame.spacing),
         _nominal(finding, config, frame.spacing),
+        _form(finding, frame.spacing),
+        side_of(finding.segment, indexed, finding.coverage) if finding.measures else None,
     )
+
+
+def _form(finding: Finding | RejectedSegment, spacing: float) -> float | None:
+    """Put the deviation of the surface from a cylinder into scene units; None if it was not measured."""
+    share = finding.measures.get("form_radii")
+    return None if share is None else share * finding.segment.radius * spacing
 
 
 def _covariance(finding: Finding, spacing: float) -> FloatArray | None:
@@ -153,6 +162,7 @@ def _rejected(
             one.payoff if game else None,
             one.confidence if verified else None,
             one.measures,
+            form=_form(one, frame.spacing),
         )
         out.append(RejectedFit(fit, one.reason))
     return sorted(out, key=lambda one: (one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers))

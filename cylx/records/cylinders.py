@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, Cylinder
 from cylx.records.clouds import PointCloud, Scene
 from cylx.records.progress import StageReport
 from cylx.records.shown import html_in_notebook
+from cylx.wording import counted
 
 if TYPE_CHECKING:
     from cylx.config import Config
@@ -199,6 +200,10 @@ class CylinderFit:
         radians. None if it was not computed.
     nominal : NominalRadius or None
         Its entry of the catalogue; None without a catalogue or a covariance.
+    form : float or None
+        Deviation of the surface from a cylinder, that neighbouring points share, scene units; None if not measured.
+    side : {'convex', 'concave', 'unknown'} or None
+        That of a pin, that of a bore, or neither can be told; None if not measured.
     """
 
     cylinder: Cylinder
@@ -211,6 +216,8 @@ class CylinderFit:
     evidence: Mapping[str, float] = field(default_factory=dict)
     covariance: FloatArray | None = None
     nominal: NominalRadius | None = None
+    form: float | None = None
+    side: Literal["convex", "concave", "unknown"] | None = None
 
     @property
     def radius_sd(self) -> float | None:
@@ -268,7 +275,7 @@ class Extraction:
         copies of one rejected segment may occur more than once.
     blends : tuple of CylinderFit or None
         Arcs that go on tangentially: rounds, fillets, slot ends. Ordered as the cylinders; their inliers are the points
-        on their surface that no cylinder has. None if blends were not asked for.
+        that no cylinder has. None if they were not looked for.
     """
 
     cylinders: tuple[CylinderFit, ...]
@@ -283,8 +290,7 @@ class Extraction:
     blends: tuple[CylinderFit, ...] | None = None
 
     def __repr__(self) -> str:
-        count = len(self.cylinders)
-        return f"{count} cylinder{'' if count == 1 else 's'} in {len(self.labels)} points"
+        return f"{counted(len(self.cylinders), len(self.blends or ()))} in {len(self.labels)} points"
 
     def _repr_html_(self) -> str:
         return html_in_notebook(self)

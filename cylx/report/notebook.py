@@ -113,7 +113,9 @@ def _glance(result: Result, view: View, most_points: int) -> dict[str, Any]:
     cylinders = [cylinder.to_object() for cylinder in result.cylinders[:count]]
     for cylinder in cylinders:
         cylinder.get("uncertainty", {}).pop("covariance", None)
-    content = result.model_copy(update={"cylinders": [], "stages": [], "warnings": [], "config": {}}).to_object()
+    content = result.model_copy(
+        update={"cylinders": [], "blends": None, "stages": [], "warnings": [], "config": {}}
+    ).to_object()
     return {
         "embedded": True,
         "result": {**content, "cylinders": cylinders},

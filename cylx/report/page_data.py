@@ -82,7 +82,10 @@ def view_of(view: View, most_points: int) -> dict[str, Any]:
     middle = low + 0.5 * size
     unit = _unit(view)
     labels = pack_labels(view.labels[chosen], len(shapes))
-    tubes = [[*(shape.start - middle), *(shape.end - middle), shape.radius] for shape in shapes]
+    tubes, arcs = (
+        [[*(shape.start - middle), *(shape.end - middle), shape.radius] for shape in listed]
+        for listed in (shapes, view.blends)
+    )
     return {
         "count": len(chosen),
         "total": len(view.points),
@@ -99,6 +102,7 @@ def view_of(view: View, most_points: int) -> dict[str, Any]:
         "colors": None if view.colors is None else _packed(view.colors[chosen]),
         "palette": _packed(cylinder_colors(np.arange(len(shapes)))),
         "cylinders": np.array(tubes).tolist(),
+        "blends": np.array(arcs).tolist(),
     }
 
 

@@ -151,6 +151,8 @@ function showDetails() {
     ["points", `${one.inliers}, rmse ${number(one.rmse, 3)}`],
     ["support", one.payoff === undefined ? String(one.support) : `${one.support}, payoff ${fraction(one.payoff)}`],
     ["confidence", fraction(one.confidence)],
+    ["form", one.form === undefined ? undefined : number(one.form, 3)],
+    ["side", one.side],
     ["nominal", match && `${nominal(one)}, ${match.decision}, ratio ${number(match.likelihood_ratio, 3)}; free radius ` +
       uncertain(match.free_radius, match.free_radius_sd)],
   ]);
@@ -251,6 +253,12 @@ function makeSections() {
   const reasons = (stage) => Object.entries(stage.rejected).map(([reason, count]) => `${reason} ${count}`).join(", ");
   section("Stages", tableOf(["stage", "considered", "kept", "rejected"],
     stages.map((stage) => [stage.name, String(stage.considered), String(stage.kept), reasons(stage)])));
+  const blends = result.blends ?? [];
+  if (blends.length) section(`Blends (${blends.length})`, tableOf(
+    ["id", "radius", "height", "points", "coverage", "confidence", "side", "middle"],
+    blends.map((one) => [String(one.id), uncertain(one.radius, one.uncertainty?.radius), number(one.height),
+      String(one.inliers), `${one.coverage_deg.toFixed(0)}°`, fraction(one.confidence), one.side ?? "–",
+      vector(one.axis_point, 5)])));
   const some = facts.rejected.length < facts.rejected_count ? `the first ${facts.rejected.length} of ` : "";
   section(`Not accepted (${some}${facts.rejected_count})`, tableOf(
     ["reason", "radius", "height", "points", "coverage", "confidence", "middle"],
@@ -306,10 +314,12 @@ function openView() {
 
 function start() {
   const count = cylinders.length;
-  document.title = `${result.input.file}: ${count} cylinder${count === 1 ? "" : "s"}`;
+  const arcs = view.blends.length;
+  const found = `${count} cylinder${count === 1 ? "" : "s"}` + (arcs ? ` and ${arcs} blend${arcs === 1 ? "" : "s"}` : "");
+  document.title = `${result.input.file}: ${found}`;
   byId("name").textContent = result.input.file;
   const points = view.count < view.total ? `${view.count} of ${view.total} points shown` : `${view.total} points`;
-  byId("counts").textContent = `${count} cylinder${count === 1 ? "" : "s"}, ${points}`;
+  byId("counts").textContent = `${found}, ${points}`;
   if (facts.embedded) document.body.classList.add("embedded");
   makeHeads();
   sortBy(0);

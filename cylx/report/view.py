@@ -44,6 +44,8 @@ class View:
         Spacing and noise of the scene, scene units.
     seed : int
         Seed for the choice of points.
+    blends : tuple of Cylinder
+        Scene units; drawn in a muted colour.
     """
 
     name: str
@@ -55,6 +57,7 @@ class View:
     spacing: float
     noise: float
     seed: int = 0
+    blends: tuple[Cylinder, ...] = ()
 
     @classmethod
     def of(cls, found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> View:
@@ -87,19 +90,24 @@ class View:
                 float(found.scene.spacing),
                 float(found.scene.noise),
                 found.config.seed,
+                tuple(fit.cylinder for fit in found.blends or ()),
             )
         if cloud is None:
             cloud = PointCloud(np.empty((0, 3)))
         elif not isinstance(cloud, PointCloud):
             cloud = PointCloud.from_array(cloud)
-        shapes = tuple(
-            Cylinder(np.array(one.axis_point), np.array(one.axis_direction), one.radius, one.height)
-            for one in found.cylinders
+        shapes, blends = (
+            tuple(
+                Cylinder(np.array(one.axis_point), np.array(one.axis_direction), one.radius, one.height)
+                for one in listed
+            )
+            for listed in (found.cylinders, found.blends or ())
         )
         labels, residuals = _annotations(cloud, len(shapes))
         colors = original_colors(cloud)
         scale = found.scene
-        return cls(found.input.file, shapes, cloud.points, labels, residuals, colors, scale.spacing, scale.noise)
+        spacing, noise = scale.spacing, scale.noise
+        return cls(found.input.file, shapes, cloud.points, labels, residuals, colors, spacing, noise, blends=blends)
 
     def thinned(self, most: int) -> View:
         """Return about `most` of the points, at equal steps of their order."""
@@ -117,11 +125,11 @@ class View:
         )
 
     def first(self, count: int) -> View:
-        """Return the first cylinders and all points; points of the other cylinders lose their labels."""
+        """Return the first cylinders and blends, and all points; points of the other cylinders lose their labels."""
         if len(self.shapes) <= count:
-            return self
+            return replace(self, blends=self.blends[:count])
         labels = np.where(self.labels < count, self.labels, -1).astype(np.int32)
-        return replace(self, shapes=self.shapes[:count], labels=labels)
+        return replace(self, shapes=self.shapes[:count], labels=labels, blends=self.blends[:count])
 
 
 def _annotations(cloud: PointCloud, count: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

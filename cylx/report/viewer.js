@@ -91,6 +91,7 @@ uniform vec4 tint; varying float light;
 void main() { gl_FragColor = vec4(tint.rgb * light, tint.a); }`;
 
 const AROUND = 40;
+const MUTED = [0.5, 0.5, 0.5]; // of blends, which are not among the cylinders
 
 /** Give the strip of triangles round a tube of radius and height 1, and behind it its two rims. */
 function tubeCorners() {
@@ -157,6 +158,7 @@ class Viewer {
     this.original = view.colors && unpack(view.colors, Uint8Array);
     this.palette = unpack(view.palette, Uint8Array);
     this.tubes = view.cylinders.map((numbers) => this.tube(numbers));
+    this.blends = view.blends.map((numbers) => this.tube(numbers));
     this.shown = { coloring: "cylinder", points: true, others: true, cylinders: true, noises: 4, dot: 1 };
     this.hidden = new Set();
     this.selected = -1;
@@ -374,16 +376,16 @@ class Viewer {
     gl.enableVertexAttribArray(names.corner);
     gl.vertexAttribPointer(names.corner, 3, gl.FLOAT, false, 0, 0);
     this.tubes.forEach((tube, number) => {
-      if (!this.hidden.has(number)) this.drawTube(names, tube, number);
+      const color = Array.from(this.palette.subarray(3 * number, 3 * number + 3), (part) => part / 255);
+      if (!this.hidden.has(number)) this.drawTube(names, tube, color, number === this.selected);
     });
+    this.blends.forEach((tube) => this.drawTube(names, tube, MUTED, false));
     gl.disableVertexAttribArray(names.corner);
     gl.depthMask(true);
   }
 
-  drawTube(names, tube, number) {
+  drawTube(names, tube, color, chosen) {
     const { gl } = this;
-    const chosen = number === this.selected;
-    const color = Array.from(this.palette.subarray(3 * number, 3 * number + 3), (part) => part / 255);
     for (const key of ["start", "axis", "across", "along"]) gl.uniform3fv(names[key], tube[key]);
     gl.uniform4f(names.tint, ...color, chosen ? 0.55 : 0.28);
     gl.drawArrays(gl.TRIANGLE_STRIP, 0, 2 * (AROUND + 1));

@@ -9,30 +9,32 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from cylx.results.cylinders import CatalogueMatch as CatalogueMatch
+    from cylx.results.cylinders import Measured as Measured
+    from cylx.results.cylinders import Numbered as Numbered
+    from cylx.results.cylinders import ResultBlend as ResultBlend
+    from cylx.results.cylinders import ResultCylinder as ResultCylinder
+    from cylx.results.cylinders import Uncertainty as Uncertainty
     from cylx.results.rejected import RejectedCylinder as RejectedCylinder
     from cylx.results.rejected import Rejections as Rejections
     from cylx.results.rejected import rejections_schema as rejections_schema
-    from cylx.results.result import CatalogueMatch as CatalogueMatch
-    from cylx.results.result import Measured as Measured
-    from cylx.results.result import Numbered as Numbered
     from cylx.results.result import Result as Result
-    from cylx.results.result import ResultCylinder as ResultCylinder
     from cylx.results.result import SceneScale as SceneScale
     from cylx.results.result import Stage as Stage
-    from cylx.results.result import Uncertainty as Uncertainty
     from cylx.results.result import result_schema as result_schema
 
 _HOMES = {
-    "CatalogueMatch": "cylx.results.result",
-    "Measured": "cylx.results.result",
-    "Numbered": "cylx.results.result",
+    "CatalogueMatch": "cylx.results.cylinders",
+    "Measured": "cylx.results.cylinders",
+    "Numbered": "cylx.results.cylinders",
     "RejectedCylinder": "cylx.results.rejected",
     "Rejections": "cylx.results.rejected",
     "Result": "cylx.results.result",
-    "ResultCylinder": "cylx.results.result",
+    "ResultBlend": "cylx.results.cylinders",
+    "ResultCylinder": "cylx.results.cylinders",
     "SceneScale": "cylx.results.result",
     "Stage": "cylx.results.result",
-    "Uncertainty": "cylx.results.result",
+    "Uncertainty": "cylx.results.cylinders",
     "rejections_schema": "cylx.results.rejected",
     "result_schema": "cylx.results.result",
 }

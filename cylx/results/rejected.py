@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import ConfigDict, Field, JsonValue
 
+from cylx.results.cylinders import Measured
 from cylx.results.parts import Input, Part, drop_missing, text_of
-from cylx.results.result import Measured
 from cylx.version import __version__
 
 if TYPE_CHECKING:

@@ -44,6 +44,22 @@ def test_what_differs_is_shown(compare):
     ]
 
 
+def test_blends_are_compared_too(run_cylx, tmp_path):
+    for name, blends in (("a", [cylinder(0)]), ("b", [cylinder(0)]), ("c", [cylinder(0, radius=1.01), cylinder(3)])):
+        (tmp_path / f"{name}.json").write_text(json.dumps({"cylinders": [cylinder(0)], "blends": blends}))
+    done = run_cylx("diff", tmp_path / "a.json", tmp_path / "b.json")
+    assert (done.exit_code, done.stdout) == (0, "the same 1 cylinder and 1 blend\n")
+    failed = run_cylx("diff", tmp_path / "a.json", tmp_path / "c.json")
+    assert failed.exit_code == 1
+    assert [line.split() for line in failed.stdout.splitlines()[2:]] == [
+        ["resized", "blend", "0", "blend", "0", "radius", "1", "1.01", "0.01", "0.005"],
+        ["extra", "blend", "3", "blend", "1"],
+    ]
+    content = json.loads(run_cylx("diff", tmp_path / "a.json", tmp_path / "c.json", "--json").stdout)
+    assert (content["blends_a"], content["blends_b"], content["blends_matched"]) == (1, 2, 1)
+    assert {entry["of"] for entry in content["differences"]} == {"blends"}
+
+
 def test_json_has_the_same(compare):
     failed = compare([cylinder(0)], [cylinder(0, inliers=50)], "--json")
     content = json.loads(failed.stdout)

@@ -60,6 +60,33 @@ def test_the_conversation_is_on_standard_error(run_cylx, scan):
     assert len(said) == 6
 
 
+def test_blends_are_counted_but_not_in_the_table(run_cylx, scan, fake_pipeline):
+    plain = run_cylx("extract", scan).stderr.splitlines()
+    fake_pipeline.blends = 3
+    said = run_cylx("extract", scan, "--overwrite").stderr.splitlines()
+    assert said[0].startswith(f"{scan}: 2 cylinders and 3 blends, written to ")
+    assert said[1:] == plain[1:]
+    content = json.loads(scan.with_name("scan.cylinders.json").read_bytes())
+    assert [len(content["cylinders"]), len(content["blends"])] == [2, 3]
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"), [([], True), (["--blends"], True), (["--no-blends"], False),
+                              (["--set", "verification.blends=false"], False)]
+)  # fmt: skip
+def test_blends_are_looked_for_unless_that_is_switched_off(run_cylx, scan, fake_pipeline, options, expected):
+    run_cylx("extract", scan, *options)
+    ((_, config, _),) = fake_pipeline.calls
+    assert config.verification.blends is expected
+
+
+def test_the_option_beats_the_configuration(run_cylx, scan, fake_pipeline, tmp_path):
+    (tmp_path / "my.yaml").write_text("verification: {blends: false}")
+    run_cylx("extract", scan, "-c", tmp_path / "my.yaml", "--blends")
+    ((_, config, _),) = fake_pipeline.calls
+    assert config.verification.blends is True
+
+
 def test_quiet_says_nothing_and_verbose_says_more(run_cylx, scan):
     assert run_cylx("extract", scan, "-q").stderr == ""
     said = run_cylx("extract", scan, "-v", "--overwrite").stderr

@@ -107,6 +107,8 @@ def test_named_options_leave_out_what_was_not_given():
         "scene.axis_tolerance_deg": 5,
         "verification.min_coverage_deg": 0,
     }
+    assert named_options(blends=False) == {"verification.blends": False}
+    assert named_options(blends=True) == {"verification.blends": True}
     assert [named_options(axis=name)["scene.axis"] for name in "xyz"] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.errors import UsageError
+from cylx.errors import InputError, UsageError
 from cylx.evaluation import Difference, Tolerances, compare
 from tests.support.documents import cylinder, document, random_documents, tilted
 
@@ -74,6 +74,34 @@ def test_missing_and_extra_cylinders_are_named():
         Difference(kind="extra", id_a=None, id_b=9, what="cylinder", b=3.0),
     )
     assert (found.cylinders_a, found.cylinders_b, found.matched) == (4, 4, 3)
+
+
+def test_blends_are_compared_like_cylinders_and_apart_from_them():
+    a = {**plant(), "blends": [cylinder(point=(5, 5, 5), id=0), cylinder(point=(9, 9, 9), id=1)]}
+    same = compare(a, {**a, "blends": a["blends"][::-1]}, tolerances=EXACT)
+    assert (same.same, same.matched, same.blends_a, same.blends_b, same.blends_matched) == (True, 4, 2, 2, 2)
+    b = {**plant(), "blends": [{**a["blends"][0], "radius": 1.01}]}
+    moved, lost = compare(a, b).differences
+    assert (moved.kind, moved.of, moved.what, moved.a, moved.b) == ("resized", "blends", "radius", 1.0, 1.01)
+    assert lost == Difference(kind="missing", id_a=1, id_b=None, what="blend", a=1.0, of="blends")
+    swapped = compare({"cylinders": a["blends"]}, {"cylinders": [], "blends": a["blends"]})
+    assert [one.kind for one in swapped.differences] == ["missing", "missing", "extra", "extra"]
+
+
+def test_no_list_of_blends_is_an_empty_one():
+    for b in ({**plant(), "blends": []}, plant()):
+        assert compare(plant(), b, tolerances=EXACT).same
+    only = compare(plant(), {**plant(), "blends": [cylinder(point=(5, 5, 5), id=7)]})
+    assert [(one.kind, one.id_b, one.of) for one in only.differences] == [("extra", 7, "blends")]
+
+
+@pytest.mark.parametrize(
+    ("blends", "place"), [("x", "b"), ([{}], "b.blends[0].axis_point"), ([cylinder(radius=0)], "b.blends[0]")]
+)
+def test_a_fault_in_a_blend_is_named(blends, place):
+    with pytest.raises(InputError) as failed:
+        compare(plant(), {**plant(), "blends": blends})
+    assert failed.value.place == place
 
 
 def test_pieces_of_one_pipe_are_not_taken_for_one_another():

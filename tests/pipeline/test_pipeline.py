@@ -49,6 +49,43 @@ def found(room):
 
 
 @pytest.fixture(scope="module")
+def block():
+    """A block with a bore through it and a round at each upright edge."""
+    rng, corner, bore, step = np.random.default_rng(4), 0.2, 0.15, 0.01
+    long, wide, high = 1.2, 1.0, 0.5
+
+    def sheet(a, b):
+        return rng.random((int(a * b / step**2), 2))
+
+    parts, level = [], 0.0
+    for sign in (-1, 1):
+        u, v = sheet(wide - 2 * corner, high), sheet(long - 2 * corner, high)
+        parts += [
+            np.column_stack([np.full(len(u), sign * long / 2), (u[:, 0] - 0.5) * (wide - 2 * corner), u[:, 1] * high])
+        ]
+        parts += [
+            np.column_stack([(v[:, 0] - 0.5) * (long - 2 * corner), np.full(len(v), sign * wide / 2), v[:, 1] * high])
+        ]
+        face = (sheet(long, wide) - 0.5) * [long, wide]
+        past = np.maximum(np.abs(face) - [long / 2 - corner, wide / 2 - corner], 0)
+        face = face[(np.hypot(*past.T) < corner) & (np.hypot(*face.T) > bore)]
+        parts += [np.column_stack([face, np.full(len(face), level)])]
+        level = high
+        for across in (-1, 1):
+            u = sheet(np.pi / 2 * corner, high)
+            arc = corner * np.column_stack([np.cos(np.pi / 2 * u[:, 0]), np.sin(np.pi / 2 * u[:, 0])])
+            parts += [
+                np.column_stack(
+                    [(arc + np.array([long / 2 - corner, wide / 2 - corner])) * [sign, across], u[:, 1] * high]
+                )
+            ]
+    u = sheet(2 * np.pi * bore, high)
+    turn = 2 * np.pi * u[:, 0]
+    points = np.concatenate([*parts, np.column_stack([bore * np.cos(turn), bore * np.sin(turn), u[:, 1] * high])])
+    return points + 0.001 * rng.standard_normal(points.shape)
+
+
+@pytest.fixture(scope="module")
 def can():
     return single(points=3000, sigma=0.01, p=0.1, sigma_o=0.05)
 
@@ -445,3 +482,28 @@ def test_without_a_refined_fit_nothing_is_said_of_uncertainty():
     found = extract_cylinders(PointCloud(scene.points), load_config(preset="paper", overrides=["slicing.planes=20"]))
     assert all(fit.covariance is None for fit in found.cylinders)
     assert all(one.uncertainty is None for one in Result.of(found).cylinders)
+
+
+# what is said of the surface
+
+
+def test_a_bore_is_concave_and_blends_are_apart(block):
+    extraction = run(block)
+    (bore,) = extraction.cylinders
+    assert (bore.cylinder.radius, bore.side) == (pytest.approx(0.15, rel=0.01), "concave")
+    assert 0.0 <= bore.form < 0.5 * 0.001
+    assert bore.form == pytest.approx(bore.evidence["form_radii"] * bore.cylinder.radius)
+    assert all(blend.side in {"convex", "unknown"} and blend.form is not None for blend in extraction.blends)
+    content = Result.of(extraction).to_object()
+    assert [blend["id"] for blend in content["blends"]] == list(range(len(extraction.blends)))
+    plain = run(block, load_config(options={"verification.blends": False}))
+    assert plain.blends is None
+    assert "blends" not in Result.of(plain).to_object()
+    assert [fit.cylinder.radius for fit in plain.cylinders] == pytest.approx([0.15], rel=0.01)
+
+
+def test_methods_that_measure_nothing_say_nothing_of_side_and_form(can):
+    extraction = run(can.points, load_config(options={"method": "msac", "max_cylinders": 1}))
+    assert extraction.blends is None
+    assert [(fit.form, fit.side) for fit in extraction.cylinders] == [(None, None)]
+    assert {"form", "side", "blends"}.isdisjoint(Result.of(extraction).to_object()["cylinders"][0])

@@ -78,6 +78,19 @@ def test_the_object_in_the_page_agrees_with_the_result(extraction):
     assert np.array_equal(unpacked(view["palette"], "u1").reshape(-1, 3), cylinder_colors(np.arange(2)))
 
 
+def test_blends_are_in_the_page_but_not_among_the_cylinders(make_extraction):
+    made = make_extraction(blends=1)
+    page_data = page_data_of(made)
+    view, result = page_data["view"], page_data["result"]
+    assert (len(result["blends"]), len(view["blends"]), len(view["cylinders"]), len(page_data["maps"])) == (1, 1, 2, 2)
+    middle = np.array(view["low"]) + 0.5 * np.array(view["size"])
+    fit = made.blends[0].cylinder
+    assert view["blends"][0] == pytest.approx([*(fit.start - middle), *(fit.end - middle), 0.5])
+    assert page_data_of(make_extraction())["view"]["blends"] == []
+    blob = blob_of(Elements(Result.of(made)._repr_html_()).of("iframe")[0]["srcdoc"])
+    assert (len(blob["view"]["blends"]), "blends" in blob["result"]) == (1, False)
+
+
 def test_the_points_in_the_page_are_those_of_the_cloud(extraction):
     view = page_data_of(extraction)["view"]
     steps = unpacked(view["points"], "<u2").reshape(-1, 3)

@@ -51,6 +51,8 @@ matches = st.builds(
 )
 givens = st.sampled_from([(), ("spacing",), ("noise",), ("spacing", "noise")])
 listed_fits = st.builds(replace, fits, nominal=matches)
+sides = st.sampled_from(["convex", "concave", "unknown"])
+sided_fits = st.builds(replace, fits, form=st.just(0.0) | positive.map(np.float64), side=sides)
 
 
 @st.composite
@@ -67,6 +69,7 @@ def extractions(draw):
         stages=(StageReport("slicing", draw(st.integers(0, 99)), 0, {"too few points": np.int64(3)}),),
         config=Config(),
         warnings=tuple(draw(st.lists(st.text(), max_size=2))),
+        blends=draw(st.none() | st.lists(sided_fits | listed_fits, max_size=2).map(tuple)),
     )
 
 
@@ -90,7 +93,8 @@ def test_what_is_written_is_by_the_schema_and_reads_back(extraction):
 @given(extractions())
 def test_keys_come_in_the_order_of_the_contract(extraction):
     content = json.loads(Result.of(extraction).to_json())
-    assert list(content) == KEYS
+    listed = [] if extraction.blends is None else ["blends"]
+    assert list(content) == [*KEYS[:-1], *listed, KEYS[-1]]
     assert list(content["input"]) == ["file", "format", "points", "sha256", "bounds"]
     for cylinder in content["cylinders"]:
         assert [key for key in cylinder if key not in {"evidence", "catalogue"}] == CYLINDER_KEYS
@@ -157,6 +161,41 @@ def test_confidence_and_uncertainty_are_written_once_they_are_known(make_extract
     assert "confidence" not in read["cylinders"][1]
 
 
+def test_form_and_side_are_written_once_they_are_measured(make_extraction):
+    content = Result.of(make_extraction()).to_object()
+    content["cylinders"][0] |= {"form": 0.5, "side": "concave"}
+    read = Result.parse(content, "r.json")
+    assert (read.cylinders[0].form, read.cylinders[0].side) == (0.5, "concave")
+    assert list(read.to_object()["cylinders"][0]) == [*CYLINDER_KEYS, "form", "side", "evidence"]
+    assert {"form", "side"}.isdisjoint(read.to_object()["cylinders"][1])
+
+
+def test_blends_have_a_list_of_their_own_and_numbers_of_their_own(make_extraction):
+    content = Result.of(make_extraction(blends=2)).to_object()
+    assert list(content)[-3:] == ["cylinders", "blends", "warnings"]
+    assert [blend["id"] for blend in content["blends"]] == [0, 1]
+    assert list(content["blends"][0]) == CYLINDER_KEYS
+    assert [blend["axis_point"] for blend in content["blends"]] == [[3, 0, 2], [5, 0, 2]]
+    assert Result.parse(content, "r.json").to_object() == content
+
+
+@pytest.mark.parametrize(("blends", "there"), [(None, False), (0, True)])
+def test_no_blends_and_none_looked_for_are_two_things(make_extraction, blends, there):
+    content = Result.of(make_extraction(blends=blends)).to_object()
+    assert ("blends" in content) == there
+    assert content.get("blends", []) == []
+    assert Result.parse(content, "r.json").blends == ([] if there else None)
+
+
+@pytest.mark.parametrize(
+    ("blends", "said"), [(None, "2 cylinders in"), (0, "2 cylinders in"), (1, "2 cylinders and 1 blend in")]
+)
+def test_blends_are_named_where_there_are_some(make_extraction, blends, said):
+    made = make_extraction(blends=blends)
+    assert repr(made).startswith(said)
+    assert repr(Result.of(made)).startswith(said)
+
+
 def test_every_key_of_the_schema_has_a_meaning():
     schema = result_schema()
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -182,6 +221,12 @@ def test_every_key_of_the_schema_has_a_meaning():
         ),
         (("color",), 1, "r.json: color: unknown key; the keys here are schema, cylx_version"),
         (("input",), None, "r.json: input: null is not a section; write its keys below it, indented"),
+        (
+            ("cylinders", 0, "side"),
+            "left",
+            "r.json: cylinders.0.side: 'left' is not one of its values; choose convex or concave or unknown",
+        ),
+        (("cylinders", 0, "form"), -1, "r.json: cylinders.0.form: -1 is out of range; it must be >= 0"),
         (("cylinders", 0, "radius"), ..., "r.json: cylinders.0.radius: is missing; add it"),
     ],
 )

@@ -8,12 +8,12 @@ MAY_IMPORT = {
     },
     "cli": {
         "api", "config", "errors", "evaluation", "experiments", "export", "io", "optional", "palette", "pipeline",
-        "records", "report", "results", "scene", "synthetic", "version",
+        "records", "report", "results", "scene", "synthetic", "version", "wording",
     },
     "api": {"config", "evaluation", "geometry", "io", "pipeline", "records", "results", "scene", "stages"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
-        "baselines", "config", "errors", "fits", "game", "geometry", "records", "scene", "stages",
+        "baselines", "config", "errors", "evidence", "fits", "game", "geometry", "records", "scene", "stages",
     },
     "stages": {"config", "evidence", "fits", "game", "geometry", "records"},
     "report": {"config", "errors", "geometry", "optional", "palette", "records", "results"},
@@ -21,10 +21,10 @@ MAY_IMPORT = {
     "scene": {"config", "errors", "fits", "geometry", "records"},
     "game": {"geometry", "records"},
     "baselines": {"config", "errors", "fits", "geometry", "optional", "records"},
-    "results": {"config", "errors", "optional", "records", "version"},
+    "results": {"config", "errors", "optional", "records", "version", "wording"},
     "io": {"errors", "optional", "palette", "records"},
     "evidence": {"geometry", "records"},
-    "records": {"config", "fits", "geometry"},
+    "records": {"config", "fits", "geometry", "wording"},
     "synthetic": {"errors", "geometry"},
     "evaluation": {"errors", "geometry"},
     "config": {"errors"},
@@ -35,5 +35,6 @@ MAY_IMPORT = {
     "moved": set(),
     "palette": set(),
     "version": set(),
+    "wording": set(),
 }  # fmt: skip
 """The rooms from the top floor to the ground; each imports from those below it only."""

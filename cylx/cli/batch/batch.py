@@ -117,7 +117,7 @@ class Batch:
             finished = self.run.extract_one(job) if before is None else before
             self.outcomes[0] = Outcome("done", finished, peak=peak_memory())
             if before is not None:
-                self.run.messages.say(f"{found_line(job, finished.cylinders)} before")
+                self.run.messages.say(f"{found_line(job, finished.cylinders, finished.blends)} before")
             check_required(job, finished.cylinders, self.run.require)
         except Exception as failure:
             known = self.outcomes.get(0)
@@ -146,7 +146,10 @@ class Batch:
 
     def _finished_before(self, job: Job) -> Finished | None:
         result = finished_before(job, self.run.settings, self.run.selection) if self.options.resume else None
-        return None if result is None else Finished(result.input.points, len(result.cylinders), result.warnings)
+        if result is None:
+            return None
+        blends = len(result.blends or ())
+        return Finished(result.input.points, len(result.cylinders), result.warnings, blends=blends)
 
     def _here(self, jobs: Sequence[Job]) -> Generator[tuple[int, Outcome], None, None]:
         """Process scans one after the other in this process."""
@@ -186,9 +189,9 @@ class Batch:
         if outcome.finished is None or (len(self.jobs) >= SHORT and not self.run.messages.verbose):
             return
         if outcome.status == "skipped":
-            self.run.messages.say(f"{found_line(job, outcome.finished.cylinders)} before")
+            self.run.messages.say(f"{found_line(job, outcome.finished.cylinders, outcome.finished.blends)} before")
         else:
-            self.run.messages.say(found_line(job, outcome.finished.cylinders))
+            self.run.messages.say(found_line(job, outcome.finished.cylinders, outcome.finished.blends))
             for warning in outcome.finished.warnings:
                 self.run.messages.say(f"warning: {printable(job.scan)}: {warning}")
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from cylx.cli.terminal.display import Messages, show_table
 from cylx.cli.terminal.failures import tell
+from cylx.wording import counted
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
@@ -20,7 +21,7 @@ def report(messages: Messages, job: Job, extraction: Extraction) -> None:
     if messages.quiet:
         return
     fits = extraction.cylinders
-    tell(found_line(job, len(fits)))
+    tell(found_line(job, len(fits), len(extraction.blends or ())))
     for warning in extraction.warnings:
         tell(f"warning: {warning}")
     if messages.verbose:
@@ -37,14 +38,14 @@ def report(messages: Messages, job: Job, extraction: Extraction) -> None:
             tell(f"… and {len(fits) - len(shown)} more; -v shows them all")
 
 
-def found_line(job: Job, found: int) -> str:
-    """Format the number of cylinders in a scan and the names of the files written."""
+def found_line(job: Job, found: int, blends: int = 0) -> str:
+    """Format the numbers of cylinders and blends in a scan and the names of the files written."""
     from cylx.io import printable
 
     written = [printable(name) for name in job.written(found) if name != "-"]
     scan = "standard input" if job.scan == "-" else printable(job.scan)
     names = " and ".join(filter(None, [", ".join(written[:-1]), *written[-1:]]))
-    return f"{scan}: {found} cylinder{'' if found == 1 else 's'}" + (f", written to {names}" if written else "")
+    return f"{scan}: {counted(found, blends)}" + (f", written to {names}" if written else "")
 
 
 def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:

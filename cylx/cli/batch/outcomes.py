@@ -29,12 +29,15 @@ class Finished:
         The warnings of the result.
     profile : dict, optional
         The times of the stages.
+    blends : int
+        Their number; 0 if they were not looked for.
     """
 
     points: int
     cylinders: int
     warnings: Sequence[str]
     profile: dict[str, object] | None = None
+    blends: int = 0
 
 
 @dataclass(frozen=True)

@@ -78,7 +78,7 @@ class Run:
         report(self.messages, job, extraction)
         for remark in remarks:
             self.messages.say(f"warning: {remark}")
-        return Finished(cloud.rows, found, extraction.warnings, profile)
+        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()))
 
 
 def attempt(run: Run, debug: bool, job: Job) -> Outcome:

@@ -211,6 +211,12 @@ _CONFIGURATION: tuple[Callable[[Any], Any], ...] = (
         metavar="DEG",
         help="Smallest angle of the surface that must be seen, about the axis, degrees.  [default: 20]",
     ),
+    click.option(
+        "--blends/--no-blends",
+        default=None,
+        help="Look for arcs that go on tangentially, such as rounds and fillets; they are listed by themselves."
+        "  [default: yes]",
+    ),
     click.option("--max-cylinders", type=click.IntRange(min=1), metavar="N", help="Maximum number of cylinders."),
     click.option("--planes", type=click.IntRange(min=0), metavar="N", help="Number of planes through the whole cloud."),
 )
