@@ -91,11 +91,27 @@ def test_equal_indices_in_two_scenes_are_two_cylinders():
 
 
 def test_kinds_of_scenes_weigh_the_same_however_many_fits_they_have():
-    scenes = np.array(["room1"] * 6 + ["plant1"] * 1 + ["plant12"] * 1)
+    scenes = np.array(["room1"] * 6 + ["clutter1"] * 1 + ["clutter12"] * 1)
     rows = logistic.Rows(np.zeros((8, 1)), np.zeros(8, bool), scenes, np.full(8, -1))
     weights = logistic.balanced_weights(rows)
     assert weights.sum() == pytest.approx(8)
     assert weights[:6].sum() == pytest.approx(weights[6:].sum())
+
+
+@pytest.mark.parametrize(("name", "share"), [("plant3", 2.0), ("depth_learn33", 1.5), ("wild_tree.las", 3.0)])
+def test_some_kinds_weigh_more(name, share):
+    scenes = np.array(["room1"] * 6 + [name] * 2)
+    weights = logistic.balanced_weights(logistic.Rows(np.zeros((8, 1)), np.zeros(8, bool), scenes, np.full(8, -1)))
+    assert weights[6:].sum() == pytest.approx(share * weights[:6].sum())
+    assert weights.sum() == pytest.approx(8)
+
+
+def test_one_part_under_several_noises_is_in_one_fold_and_of_one_kind():
+    names = [f"fit4cad_PC{part}@{noise:g}" for part in range(30) for noise in (0.0, 0.05, 0.5)]
+    fold = logistic.folds_of(np.array(names)).reshape(30, 3)
+    assert (fold == fold[:, :1]).all()
+    assert len(set(fold[:, 0])) == logistic.FOLDS
+    assert {logistic.kind_of(name) for name in names} == {"fit4cad"}
 
 
 @given(st.lists(st.sampled_from("abcdefghijkl"), min_size=1, max_size=80))
@@ -417,14 +433,31 @@ def test_the_evidence_is_itself_again_after_an_ablation():
 
 def synthetic_line(rng, index):
     """Make a line with every measure there is, of which the agreement decides."""
-    names = (
-        "noise_ratio structure structure_radii inside outside tangent slope slope_error bulge bulge_error flank bend"
-    )
-    measures = {name: float(0.1 * rng.random()) for name in names.split()}
+    names = [
+        "noise_ratio",
+        "structure",
+        "structure_radii",
+        "form_radii",
+        "ovality",
+        "explained",
+        "facets",
+        "inside",
+        "outside",
+        "tangent",
+        "tangent_both",
+        "slope",
+        "slope_error",
+        "bulge",
+        "bulge_error",
+        "flank",
+        "bend",
+    ]
+    measures = {name: float(0.1 * rng.random()) for name in names}
     true = bool(rng.random() < 0.4)
     measures |= {"height_radii": float(5 * rng.random()), "agreement": float(0.4 * true + 0.5 * rng.random())}
     measures |= {"curvature": 9.0, "windows": 5.0, "places": 12.0, "coverage": 3.0, "inliers": 300.0, "payoff": 0.7}
     measures |= {"lack_of_fit": float(1.0 + rng.random()), "bend_error": 0.01, "radius_noises": 9.0}
+    measures |= {"scatter_radii": 0.1, "roughness": float(1.0 + rng.random()), "deviation_radii": 0.1}
     return {
         "scene": f"s{index % 20}",
         "label": labels.TRUE if true else labels.FALSE,

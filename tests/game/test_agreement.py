@@ -1,11 +1,22 @@
 """What the candidates say of a cylinder: the quick search by place against a look at all of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.game.agreement import AGREEING, CONCENTRIC, LEAST_TELLING_SHARE, LIKE_RADIUS, Neighbourhood, is_contradicted
+from cylx.game.agreement import (
+    AGREEING,
+    BESIDE,
+    CONCENTRIC,
+    LEAST_TELLING_SHARE,
+    LIKE_RADIUS,
+    TOUCHING,
+    Neighbourhood,
+    is_contradicted,
+)
 from cylx.records import Candidates, Segment
 
 seeds = st.integers(0, 2**32 - 1)
@@ -50,7 +61,14 @@ def same(models, segment, offset, cosine, radius):
     """Tell which models agree with a cylinder; offset in its radii."""
     _, apart = distances(models[:, :3], segment)
     turns = np.abs(models[:, 3:6] @ segment.direction)
-    return (apart < offset * segment.radius) & (turns > cosine) & (np.abs(models[:, 6] / segment.radius - 1) < radius)
+    alike = (apart < offset * segment.radius) & (turns > cosine) & (np.abs(models[:, 6] / segment.radius - 1) < radius)
+    return alike & touching(models, segment)
+
+
+def touching(models, segment):
+    """Tell which models may touch a cylinder where their windows are: axes lie as far apart as radii differ."""
+    _, apart = distances(models[:, :3], segment)
+    return np.abs(apart - np.abs(models[:, 6] - segment.radius)) <= TOUCHING * segment.radius
 
 
 @laws
@@ -62,6 +80,7 @@ def test_agreement_is_that_of_all_candidates(seed):
     heights, apart = distances(candidates.points, segment)
     telling = candidates.windows > LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half)
     near = telling & (np.abs(heights) < segment.half) & (apart < segment.radius)
+    near &= touching(candidates.models, segment)
     # a pipe on the same axis that is much thinner or thicker is another one
     ratio = candidates.radii / segment.radius
     near &= (ratio > LIKE_RADIUS) & (ratio < 1 / LIKE_RADIUS)  # and of a detail: a rim, a dent
@@ -107,6 +126,30 @@ def test_counts_do_not_know_unit_place_or_order(seed, exponent):
     alive = np.ones(len(candidates), bool)
     there_too = order[near_there.agreeing(there, alive, 0.3, 10.0, 0.2)]
     assert set(there_too) == set(near.agreeing(segment, alive, 0.3, 10.0, 0.2))
+
+
+@laws
+@given(seeds)
+def test_windows_count_only_where_they_were_laid_on_the_surface(seed):
+    rng = np.random.default_rng(seed)
+    segment = a_segment(rng)
+    candidates = candidates_about(rng, segment)
+    across = unit(np.cross(segment.direction, rng.standard_normal((len(candidates), 3))))
+    height = segment.half * rng.choice([0.5, 1.5], len(candidates))
+    distance = segment.radius * (1 + BESIDE * rng.choice([-2, -0.9, 0, 0.9, 2], len(candidates)))
+    places = segment.point + height[:, None] * segment.direction + distance[:, None] * across
+    on = (height < segment.half) & (np.abs(distance / segment.radius - 1) < BESIDE)
+    everywhere = segment.point + segment.radius * across
+    assert Neighbourhood(replace(candidates, places=places)).agreement(segment) == Neighbourhood(
+        replace(candidates.take(on), places=everywhere[on])
+    ).agreement(segment)
+
+
+def test_a_window_of_an_unknown_place_counts():
+    segment = Segment(np.array([0.0, 0, 0, 0, 0, 1, 1]), 2.0, 0.0)
+    candidates = Candidates(np.tile(segment.model, (9, 1)), np.arange(9), np.zeros(9), np.full(9, 20), np.ones(9))
+    assert np.isnan(candidates.places).all()
+    assert Neighbourhood(candidates).agreement(segment) == (9, 9)
 
 
 def test_nobody_says_nothing():

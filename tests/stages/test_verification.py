@@ -104,12 +104,17 @@ def test_a_flat_strip_shows_no_curvature():
     assert verdict.reason != ""
 
 
-@pytest.mark.parametrize(("distance", "name"), [(0.8, "inside"), (1.15, "outside")])
-def test_points_beside_the_surface_are_counted_against_it(distance, name):
-    other = pipe() * [distance, distance, 1]
+@pytest.mark.parametrize(("low", "high", "name"), [(0.3, 0.9, "inside"), (1.15, 1.15, "outside")])
+def test_points_beside_the_surface_are_counted_against_it(low, high, name):
+    distance = np.random.default_rng(8).uniform(low, high, (len(pipe()), 1))
+    other = pipe() * np.column_stack([distance, distance, np.ones(len(distance))])
     measures = judge(np.concatenate([pipe(), other])).measures
     assert np.isclose(measures[name], 1.0, atol=0.1)
     assert measures["inside" if name == "outside" else "outside"] < 0.05
+
+
+def test_the_inner_wall_of_a_tube_does_not_count_against_the_outer_one():
+    assert judge(np.concatenate([pipe(), pipe() * [0.8, 0.8, 1]])).measures["inside"] < 0.05
 
 
 def test_a_lid_is_forgiven():

@@ -26,22 +26,32 @@ def extracted(scene):
     return extract_cylinders(PointCloud(scene.points), Config())
 
 
+def judged_fits(extraction, *, blends=False):
+    """Give each fit that was measured, accepted or not, and why not; accepted blends only if they are asked for."""
+    judged = [(fit, "") for fit in [*extraction.cylinders, *(extraction.blends if blends else ())]]
+    judged += [(rejection.fit, rejection.reason) for rejection in extraction.rejected]
+    return [(fit, reason) for fit, reason in judged if fit.evidence]
+
+
+def row_of(scene, fit, reason, label, owner):
+    """Give the row of a fit."""
+    return {
+        "scene": scene,
+        "label": label,
+        "cylinder": owner,
+        "measures": measures_of(fit),
+        "support": fit.support,
+        "confidence": fit.confidence,
+        "reason": reason,
+    }
+
+
 def rows_of(name, scene, extraction):
     """Give a row for each fit that was judged, accepted or not."""
-    judged = [(fit, "") for fit in extraction.cylinders]
-    judged += [(rejection.fit, rejection.reason) for rejection in extraction.rejected]
-    judged = [(fit, reason) for fit, reason in judged if fit.evidence]
+    judged = judged_fits(extraction)
     labels, owners = label_fits(scene.truth(), [fit.cylinder for fit, _ in judged])
     return [
-        {
-            "scene": name,
-            "label": label,
-            "cylinder": owner,
-            "measures": measures_of(fit),
-            "support": fit.support,
-            "confidence": fit.confidence,
-            "reason": reason,
-        }
+        row_of(name, fit, reason, label, owner)
         for (fit, reason), label, owner in zip(judged, labels, owners, strict=True)
     ]
 

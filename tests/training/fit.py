@@ -1,8 +1,10 @@
-"""Fit the weights of `cylx.evidence` to rows of `collect.py`, and say how far they can be trusted.
+"""Fit the weights of `cylx.evidence` to rows of `collect.py`, `real.py`, `things.py` and `arcs.py`.
 
-The terms and their signs are those of `cylx.evidence.weights.TERMS`; the weights are fitted anew. All tables are
-cross-validated by scene: each fit is judged by weights that were found without its scene. Fits of a true cylinder that
-need not be found, and those near one that are neither it nor something else, are counted and left out.
+The terms and their signs are those of `cylx.evidence.weights`, and the weights are fitted anew: of `TERMS` to fits, of
+`BLEND_TERMS` to the arcs of `arcs.py`. All tables are cross-validated by scene: each fit is judged by weights that were
+found without its scene, and without others of the same thing, such as a CAD part under another noise. Fits of a true
+cylinder that need not be found, and those near one that are neither it nor something else, are counted and left out.
+So are arcs of CAD parts that go on tangentially, unless they are false: as cylinders they may be missed.
 """
 
 import argparse
@@ -13,31 +15,51 @@ from pathlib import Path
 
 import numpy as np
 from labels import FALSE, TRUE
-from logistic import Rows, balanced_weights, cross_validated, fit_law
+from logistic import STRENGTH, Rows, balanced_weights, cross_validated, fit_law, kind_of
 from scores import average_precision, brier, calibration, cylinders_found, log_loss, rates
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from tables import number, print_header, print_row
 
 from cylx.config import VerificationConfig
-from cylx.evidence.weights import TERMS
+from cylx.evidence.weights import BLEND_TERMS, TERMS
+from cylx.stages.verification import GOES_ON
 
 LEAST = VerificationConfig().min_inliers
 """Fits of fewer points are refused whatever their confidence, so that it need not be right for them."""
 BARS = (0.3, 0.5, 0.7, 0.9)
+WITH_ARCS = {"fit4cad"}
+"""Kinds of scenes whose arcs go on tangentially as often as not."""
+ARC = 3.7
+"""Angle (radians) below which a true cylinder of them is one, if it goes on tangentially."""
+BLEND_STRENGTH = 0.5
+"""Penalty for the weights of blends, as `STRENGTH`: there are fewer rows, and their terms say more."""
 PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "calibration.png"
 
 
 def read_rows(paths):
-    """Read the lines of files; a scene that two of them have would count twice."""
+    """Read the lines of files; a scene that two of them have would count twice, but for its arcs."""
     lines, scenes = [], set()
     for path in paths:
         fresh = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-        there = {line["scene"] for line in fresh}
+        there = {(line["scene"], is_arc(line)) for line in fresh}
         if there & scenes:
-            raise SystemExit(f"{path}: {', '.join(sorted(there & scenes))}: in another file, too; give it once")
+            names = sorted({scene for scene, _ in there & scenes})
+            raise SystemExit(f"{path}: {', '.join(names)}: in another file, too; give it once")
         lines, scenes = lines + fresh, scenes | there
     return lines
+
+
+def is_arc(line):
+    """Tell whether a line is a verdict on an arc."""
+    return line.get("arc", False)
+
+
+def may_be_missed(line):
+    """Tell whether a line is a true arc that goes on tangentially: no cylinder for the result, but nothing else."""
+    measures = line["measures"]
+    tangential = measures["tangent"] >= GOES_ON and measures["coverage"] < ARC
+    return kind_of(line["scene"]) in WITH_ARCS and line["label"] == TRUE and tangential
 
 
 def table_of(lines, terms=TERMS):
@@ -57,11 +79,11 @@ def signs_of(terms):
     return np.copysign(1.0, [term.weight for term in terms])
 
 
-def written(law, rows, terms=TERMS):
+def written(law, rows, terms=TERMS, bias="BIAS"):
     """Write a law as those lines of `cylx/evidence/weights.py` that change; `usual` is the mean over true cylinders."""
     share = balanced_weights(rows) * rows.true
     usual = share @ rows.terms / share.sum()
-    lines = [f"BIAS = {law.bias:.3f}"]
+    lines = [f"{bias} = {law.bias:.3f}"]
     lines += [
         f'    Term("{term.reason}", {weight:.3f}, {mean:.2f}, ...'
         for term, weight, mean in zip(terms, law.weights, usual, strict=True)
@@ -106,6 +128,25 @@ def print_calibration(probability, rows):
     print_header("confidence", "fits", "mean confidence", "true")
     for low, high, count, mean, share in calibration(probability, rows.true):
         print_row(f"{low:g} to {high:g}", str(count), f"{mean:.3f}", f"{share:.3f}")
+
+
+def print_sources(probability, rows):
+    """Print, for each kind of scene, how far the confidences are right on the whole, and what a bar of 0.5 does."""
+    print_header("source", "scenes", "fits", "mean confidence", "true", "Brier", "cylinders found", "false fits")
+    kinds = np.array([kind_of(name) for name in rows.scenes])
+    for kind in np.unique(kinds):
+        own, p = rows.subset(kinds == kind), probability[kinds == kind]
+        known = set(zip(own.scenes[own.true].tolist(), own.owners[own.true].tolist(), strict=True))
+        print_row(
+            kind,
+            str(len(set(own.scenes))),
+            str(len(p)),
+            f"{p.mean():.3f}",
+            f"{own.true.mean():.3f}",
+            f"{brier(p, own.true, np.ones(len(p))):.4f}",
+            f"{len(cylinders_found(p, own, 0.5))} of {len(known)}",
+            str(int(((p >= 0.5) & ~own.true).sum())),
+        )
 
 
 def print_rates(probability, rows):
@@ -173,26 +214,41 @@ def parse():
     return parser.parse_args()
 
 
-def main():
-    """Fit, and print everything."""
-    a = parse()
-    lines = read_rows(a.rows)
-    rows, signs = table_of(lines), signs_of(TERMS)
-    counts = Counter(line["label"] for line in lines)
-    print(f"{len(set(rows.scenes))} scenes, {len(lines)} fits: {', '.join(f'{n} {k}' for k, n in counts.items())}\n")
-    print(f"{written(fit_law(rows, signs), rows)}\n")
-    probability = cross_validated(rows, signs)
+def print_law(rows, signs, terms, bias, strength):
+    """Fit a law and print it, with the tables of how far it can be trusted; give the cross-validated probabilities."""
+    print(f"{written(fit_law(rows, signs, strength), rows, terms, bias)}\n")
+    probability = cross_validated(rows, signs, strength=strength)
     score = quality(probability, rows)
     print(f"Cross-validated log-loss {score['log_loss']:.4f}, Brier score {score['brier']:.4f}\n")
     print_calibration(probability, rows)
     print()
+    print_sources(probability, rows)
+    print()
     print_rates(probability, rows)
     print()
-    print_ablation(probability, rows, signs)
-    if a.ablation:
-        a.ablation.write_text(json.dumps(laws_without(rows, signs), indent=2) + "\n", encoding="utf-8")
-    if a.plot:
-        draw(probability, rows, a.plot)
+    return probability
+
+
+def main():
+    """Fit, and print everything."""
+    a = parse()
+    lines = read_rows(a.rows)
+    fits, arcs = [line for line in lines if not is_arc(line)], [line for line in lines if is_arc(line)]
+    if fits:
+        rows, signs = table_of([line for line in fits if not may_be_missed(line)]), signs_of(TERMS)
+        counts = Counter(line["label"] for line in fits)
+        print(f"{len(set(rows.scenes))} scenes, {len(fits)} fits: {', '.join(f'{n} {k}' for k, n in counts.items())}\n")
+        probability = print_law(rows, signs, TERMS, "BIAS", STRENGTH)
+        print_ablation(probability, rows, signs)
+        if a.ablation:
+            a.ablation.write_text(json.dumps(laws_without(rows, signs), indent=2) + "\n", encoding="utf-8")
+        if a.plot:
+            draw(probability, rows, a.plot)
+    if arcs:
+        rows, counts = table_of(arcs, BLEND_TERMS), Counter(line["label"] for line in arcs)
+        scenes = len(set(rows.scenes))
+        print(f"\n{scenes} scenes, {len(arcs)} arcs: {', '.join(f'{n} {k}' for k, n in counts.items())}\n")
+        print_law(rows, signs_of(BLEND_TERMS), BLEND_TERMS, "BLEND_BIAS", BLEND_STRENGTH)
     return 0
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from fit import read_rows
 from labels import AMBIGUOUS, FALSE, IGNORED, TRUE
+from logistic import kind_of
 
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from tables import print_header, print_row
@@ -34,9 +35,9 @@ def print_confidences(lines):
 def print_kinds(lines):
     """Print the same for each kind of scene, all confidences together."""
     print_header("kind", "scenes", "accepted", "true", "false", "near a true one", "ones that need not be found")
-    kinds = sorted({line["scene"].rstrip("0123456789") for line in lines})
+    kinds = sorted({kind_of(line["scene"]) for line in lines})
     for kind in kinds:
-        own = [line for line in lines if line["scene"].rstrip("0123456789") == kind]
+        own = [line for line in lines if kind_of(line["scene"]) == kind]
         counts = Counter(line["label"] for line in own)
         cells = [str(counts[label]) for label in (TRUE, FALSE, AMBIGUOUS, IGNORED)]
         print_row(kind, str(len({line["scene"] for line in own})), str(len(own)), *cells)

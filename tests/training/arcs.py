@@ -1,0 +1,94 @@
+"""Run the pipeline on CAD parts and write one JSON line for each arc that was judged to be a blend, or to be none.
+
+Rounds, fillets and slot ends go on tangentially, and are weighed by a law of their own. The pipeline keeps of them
+those that it accepts; here all verdicts on them are taken down. `fit.py` tells these lines from others by `arc`.
+"""
+
+import argparse
+import json
+import sys
+from collections import Counter
+from contextlib import contextmanager
+from pathlib import Path
+
+from collect import done_before
+from references import CAD_NEAR_OF_ARCS, DATA, NOISES, cad_parts
+
+from cylx.config import Config
+from cylx.pipeline import extract_cylinders, rounds
+from cylx.scene import prepare
+
+
+@contextmanager
+def noted():
+    """Take down the segments that are judged as arcs, with the verdicts and payoffs, for a while."""
+    before, found = rounds.verify, []
+
+    def verify(segment, indexed, payoff, counts, config, *, arc=False):
+        verdict = before(segment, indexed, payoff, counts, config, arc=arc)
+        if arc and verdict.measures:
+            found.append((segment, verdict, payoff))
+        return verdict
+
+    rounds.verify = verify
+    try:
+        yield found
+    finally:
+        rounds.verify = before
+
+
+def rows_of(scan):
+    """Give a row for each verdict on an arc of a part."""
+    with noted() as found:
+        extract_cylinders(scan.cloud, Config(), threads=1)  # in order, so that the rows are the same again
+    frame = prepare(scan.cloud, Config()).frame
+    rows = []
+    for segment, verdict, payoff in found:
+        label, owner = scan.judge(frame.to_scene(segment.cylinder))
+        own = {"coverage": verdict.coverage, "inliers": len(verdict.points), "payoff": payoff}
+        rows.append(
+            {
+                "scene": scan.name,
+                "arc": True,
+                "label": label,
+                "cylinder": owner,
+                "measures": {key: float(value) for key, value in {**verdict.measures, **own}.items()},
+                "confidence": verdict.confidence,
+                "reason": verdict.reason,
+            }
+        )
+    return rows
+
+
+def parse():
+    """Read the command line."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("output", type=Path, metavar="OUT.jsonl")
+    parser.add_argument(
+        "--noise", type=float, nargs="+", default=list(NOISES[:3]), metavar="SPACINGS", help="default: 0 to 0.2"
+    )
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="only every so manyth part")
+    parser.add_argument("--start", type=int, default=0, metavar="N", help="from this one on (default: 0)")
+    parser.add_argument("--data", type=Path, default=DATA, help="folder of the parts (default: ../shared/data)")
+    parser.add_argument("--append", action="store_true", help="keep the parts that the file has already")
+    return parser.parse_args()
+
+
+def main():
+    """Collect rows, part by part, and say what they are."""
+    a = parse()
+    there = done_before(a.output) if a.append else set()
+    with a.output.open("a" if a.append else "w", encoding="utf-8") as file:
+        for scan in cad_parts(a.data, a.noise, a.every, a.start, near=CAD_NEAR_OF_ARCS):
+            if scan.name in there:
+                continue
+            rows = rows_of(scan)
+            file.writelines(json.dumps(row) + "\n" for row in rows)
+            file.flush()
+            counts = Counter(row["label"] for row in rows)
+            print(f"{scan.name}: {', '.join(f'{n} {label}' for label, n in sorted(counts.items())) or 'no arc'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
