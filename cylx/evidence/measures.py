@@ -26,6 +26,8 @@ SPARSE = 0.2
 """Where there is less than this share of the usual density, points lie between lines."""
 BESIDE, LEAST_FREEDOM = 6.0, 8
 """Points whose mean each is compared with, and degrees of freedom without which that tells nothing."""
+CLOSED = 20
+"""Sectors, of 24, that make a cylinder closed."""
 FLAT_RISE = 6.0
 """A flat window may hide a curve that rises by so many times the scatter."""
 FLAT_LEAST = 0.02
@@ -219,7 +221,7 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
     dict of str to float
         `lack_of_fit`: chi-square per cell; `structure`: the rms of what is structure in the residuals, frame units;
         `ovality`: the rms of an ellipse in it, frame units; `explained`: the largest share of it that a cone, a barrel,
-        a bent or an elliptic cylinder would explain, in [0, 1].
+        a bent or an elliptic cylinder would explain, or, of a closed one, a prism of five to eight sides, in [0, 1].
     """
     z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
     rows = int(np.clip(len(z) / 60, 3, 8))
@@ -245,6 +247,9 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
         "bent": [middle**2 * cosine, middle**2 * sine],
         "oval": [np.cos(2.0 * turn), np.sin(2.0 * turn)],
     }
+    if len(np.unique(turn)) >= CLOSED:
+        # of a piece of the arc any smooth deviation would be explained by these
+        shapes |= {f"prism of {k} sides": [np.cos(k * turn), np.sin(k * turn)] for k in range(5, 9)}
     means = sums / counts[full] * weights
     left = _left_over(base, weights, means)
     gains = {

@@ -98,7 +98,10 @@ def continuation(shell: Shell, radius: float) -> tuple[float, float]:
         most = radius * (1.0 / np.cos(np.clip(past, 0.0, reach) + early) - 1.0) + 4.0 * shell.deviation
         # what is within three deviations is the surface itself, seen less often there
         least = np.maximum(least, 3.0 * shell.deviation)
-        along = middle & (past > 0) & (past < reach) & (shell.residuals > least) & (shell.residuals < most)
+        off = (shell.residuals > least) & (shell.residuals < most)
+        # a plane that touches the arc lies on its surface at first
+        off |= shell.flat & (np.abs(shell.residuals) < 3.0 * shell.deviation)
+        along = middle & (past > 0) & (past < reach) & off
         shares.append(float(along.sum()) / (reach / width) / density)
     # an edge turns by less than half a turn; of more, both ends would have to go on
     return (max(shares) if closed.sum() <= SECTORS // 2 else min(shares)), min(shares)
