@@ -390,6 +390,7 @@ def test_reports_add_up(room, found, by_paper):
             found,
             [
                 "curvature",
+                "patches",
                 "slicing",
                 "ellipses",
                 "candidates",
@@ -439,8 +440,8 @@ def test_an_observer_is_told_of_every_stage(can):
     run(can.points, observer=spy)
     assert spy.started == spy.finished
     assert list(dict.fromkeys(spy.started)) == [  # clustering, averaging and verification come in rounds
-        "scene", "curvature", "slicing", "ellipses", "candidates", "clustering", "averaging", "verification", "merging",
-        "labelling",
+        "scene", "curvature", "patches", "slicing", "ellipses", "candidates", "clustering", "averaging", "verification",
+        "merging", "labelling",
     ]  # fmt: skip
     assert spy.advanced > 0
 
