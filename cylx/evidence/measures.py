@@ -221,7 +221,8 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
     dict of str to float
         `lack_of_fit`: chi-square per cell; `structure`: the rms of what is structure in the residuals, frame units;
         `ovality`: the rms of an ellipse in it, frame units; `explained`: the largest share of it that a cone, a barrel,
-        a bent or an elliptic cylinder would explain, or, of a closed one, a prism of five to eight sides, in [0, 1].
+        a bent or an elliptic cylinder would explain, in [0, 1]; `prism`: the same of a prism of five to eight sides, 0
+        if the cylinder is not closed.
     """
     z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
     rows = int(np.clip(len(z) / 60, 3, 8))
@@ -230,7 +231,7 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
     counts = np.bincount(cell, minlength=24 * rows).astype(np.float64)
     full = counts >= 4
     if full.sum() <= 6:
-        return {"lack_of_fit": 1.0, "structure": 0.0, "ovality": 0.0, "explained": 0.0}
+        return {"lack_of_fit": 1.0, "structure": 0.0, "ovality": 0.0, "explained": 0.0, "prism": 0.0}
     total, cells = float(counts[full].sum()), float(full.sum())
     sums = np.bincount(cell, residuals, minlength=24 * rows)[full]
     squares = float((sums**2 / counts[full]).sum())
@@ -247,16 +248,19 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
         "bent": [middle**2 * cosine, middle**2 * sine],
         "oval": [np.cos(2.0 * turn), np.sin(2.0 * turn)],
     }
-    if len(np.unique(turn)) >= CLOSED:
-        # of a piece of the arc any smooth deviation would be explained by these
-        shapes |= {f"prism of {k} sides": [np.cos(k * turn), np.sin(k * turn)] for k in range(5, 9)}
+    # of a piece of the arc any smooth deviation would be explained by these
+    closed = len(np.unique(turn)) >= CLOSED
+    prisms = [[np.cos(k * turn), np.sin(k * turn)] for k in range(5, 9)] if closed else []
     means = sums / counts[full] * weights
     left = _left_over(base, weights, means)
     gains = {
         name: max(0.0, left - _left_over(base + terms, weights, means) - 2.0 * len(terms) * variance)
         for name, terms in shapes.items()
     }
+    rest = [_left_over(base + terms, weights, means) for terms in prisms]
+    faceted = max(0.0, left - min(rest, default=left) - 4.0 * variance)
     return {
+        "prism": faceted / left if left > 0.0 else 0.0,
         "lack_of_fit": squares / variance / max(int(cells) - 5, 1),
         "structure": math.sqrt(excess),
         "ovality": math.sqrt(gains["oval"] / total),

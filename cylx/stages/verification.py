@@ -128,6 +128,7 @@ def verify(
         "structure_radii": structure / radius,
         "ovality": form["ovality"] / radius,
         "explained": form["explained"],
+        "prism": form["prism"],
         "facets": facets(shell, indexed.flatness, radius, scatter),
         "deviation_radii": deviation / radius,
         "inside": inside,
