@@ -198,8 +198,8 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     --------
     >>> pipe = dict(lack_of_fit=1.0, structure_radii=0.0, explained=0.0, inside=0.0, outside=0.0, tangent=0.0,
     ...             flank=0.0, coverage=6.0, facets=0.0, prism=0.0, roughness=1.0, inliers=2000.0, curvature=500.0,
-    ...             height_radii=9.0, payoff=0.8, agreement=0.95, scatter_radii=0.01, slope=0.0, slope_error=0.001, bulge=0.0, bend=0.0,
-    ...             bend_error=0.001)
+    ...             height_radii=9.0, payoff=0.8, agreement=0.95, scatter_radii=0.01, slope=0.0, slope_error=0.001,
+    ...             bulge=0.0, bend=0.0, bend_error=0.001)
     >>> weigh(pipe)[0] > 0.99
     True
     >>> confidence, worst = weigh({**pipe, "agreement": 0.1, "payoff": 0.3})

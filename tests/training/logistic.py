@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 STRENGTH = 2.0
 """Penalty on the squared weights of the standardised terms, halved: what a few rows say is not believed quite."""
 FOLDS = 6
-CAUTION = 2.0
+CAUTION = 1.4
 """What a false fit weighs beside a true one: the world holds more kinds of things that are none than are made up here,
 and a cylinder that is not there does more harm than one that is missed."""
 
