@@ -18,14 +18,18 @@ from cylx.synthetic.surfaces import Box, Mantle, Sphere, Wall
 sys.path.insert(0, str(Path(__file__).parent / "training"))
 
 import ablation
+import arcs
 import collect
 import drafts
 import fit
 import labels
 import logistic
+import real
+import references
 import scenes
 import scores
 import solids
+import things
 import visibility
 
 SIGNS = np.array([1.0, -1.0, 1.0])
@@ -408,6 +412,169 @@ def test_the_program_prints_what_can_be_pasted(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", ["fit.py", str(path), str(path)])
     with pytest.raises(SystemExit, match="in another file"):
         fit.main()
+
+
+def test_arcs_have_weights_of_their_own(tmp_path, monkeypatch, capsys):
+    rng = np.random.default_rng(12)
+    fits, judged = [synthetic_line(rng, i) for i in range(300)], [synthetic_line(rng, i) for i in range(300)]
+    for name, lines in (("fits", fits), ("arcs", [{**line, "arc": True} for line in judged])):
+        text = "".join(json.dumps(line) + "\n" for line in lines)
+        (tmp_path / f"{name}.jsonl").write_text(text, encoding="utf-8")
+    names = [str(tmp_path / f"{name}.jsonl") for name in ("fits", "arcs")]
+    monkeypatch.setattr(sys, "argv", ["fit.py", *names])
+    assert fit.main() == 0
+    out = capsys.readouterr().out
+    cylinders, blends = out[: out.index("BLEND_BIAS")], out[out.index("BLEND_BIAS") :]
+    for part, terms in ((cylinders, evidence_weights.TERMS), (blends, evidence_weights.BLEND_TERMS)):
+        for term in terms:
+            assert f'Term("{term.reason}", ' in part
+        assert "| source | scenes | fits |" in part
+        assert "| s | 20 | 300 |" in part
+
+
+@pytest.mark.parametrize(
+    ("scene", "label", "tangent", "coverage", "missed"),
+    [
+        ("fit4cad_PC1@0.2", "true", 0.5, 1.6, True),
+        ("fit4cad_PC1@0.2", "true", 0.0, 1.6, False),
+        ("fit4cad_PC1@0.2", "true", 0.5, 6.0, False),
+        ("fit4cad_PC1@0.2", "false", 0.5, 1.6, False),
+        ("room3", "true", 0.5, 1.6, False),
+    ],
+)
+def test_true_arcs_of_parts_are_no_cylinders_to_be_found(scene, label, tangent, coverage, missed):
+    line = {"scene": scene, "label": label, "measures": {"tangent": tangent, "coverage": coverage}}
+    assert fit.may_be_missed(line) == missed
+
+
+PART = [{"axis_point": [1.0, 2.0, 3.0], "axis_direction": [0.0, 0.0, -1.0], "radius": 2.0}]
+
+
+@pytest.mark.parametrize(
+    ("point", "direction", "radius", "label"),
+    [
+        ((1, 2, 50), (0, 0, 1), 2.0, labels.TRUE),
+        ((1.19, 2, 0), (0, 0, 1), 2.09, labels.TRUE),
+        ((1.21, 2, 0), (0, 0, 1), 2.0, labels.AMBIGUOUS),
+        ((1, 2, 3), (0, 0.1, 1), 2.0, labels.AMBIGUOUS),
+        ((1, 2, 3), (0, 0, 1), 2.3, labels.AMBIGUOUS),
+        ((1, 2, 3), (0, 0, 1), 2.5, labels.FALSE),
+        ((3, 2, 3), (0, 0, 1), 2.0, labels.FALSE),
+        ((1, 2, 3), (1, 0, 0), 2.0, labels.FALSE),
+    ],
+)
+def test_what_a_fit_of_a_part_is(point, direction, radius, label):
+    shape = Cylinder(point, direction, radius, 1.0)
+    assert references.judge_of_part(PART)(shape) == (label, 0 if label == labels.TRUE else None)
+
+
+def test_an_open_mug_is_known_by_either_wall():
+    wall = {"point": [0.0, 0, 1], "axis": [0.0, 0, 2], "radius": 0.04}
+    judge = references.judge_of_depth([{**wall, "alternatives": [{**wall, "radius": 0.05}]}])
+    verdicts = [judge(Cylinder((0, 0, 1), (0, 0, 1), radius, 0.1)) for radius in (0.04, 0.05, 0.0445, 0.07)]
+    assert verdicts == [(labels.TRUE, 0), (labels.TRUE, 0), (labels.AMBIGUOUS, None), (labels.FALSE, None)]
+
+
+def test_a_stem_is_known_by_height():
+    profile = [{"h": h, "x": 0.1 * h, "y": 0.0, "d": 0.4 - 0.02 * h} for h in (0.5, 1.5, 2.5, 3.5, 4.5)]
+    allowed = {"angle_deg": 5, "offset_r": 0.25, "radius_pct": 10}
+    stem = {"kind": "profile", "profile": profile, "ground_z": 10.0, "axis": [0.1, 0, 1], "tolerances": allowed}
+    judge = references.judge_of_wild({"refs": [stem], "never_all": True}, np.empty((0, 3)))
+    leaning = (0.1, 0, 1)
+    assert judge(Cylinder((0.2, 0, 12), leaning, 0.18, 1.0)) == (labels.TRUE, 0)
+    for point, direction, radius in (
+        ((0.0, 0, 12), leaning, 0.18),
+        ((0.2, 0, 12), leaning, 0.22),
+        ((0.2, 0, 12), (0.3, 0, 1), 0.18),
+        ((0.6, 0, 16), leaning, 0.28),
+    ):
+        assert judge(Cylinder(point, direction, radius, 1.0)) == (labels.FALSE, None)
+
+
+def test_what_is_not_known_may_be_borne_out_by_its_points():
+    rng = np.random.default_rng(8)
+    shape = Cylinder((1, 2, 3), (0, 0.5, 1), 0.2, 2.0)
+    points = Mantle(shape, 0.0, 2 * np.pi).sample(rng, 500)
+    assert references.borne_out(points, shape)
+    assert not references.borne_out(Mantle(shape, 0.0, 1.0).sample(rng, 500), shape)
+    assert not references.borne_out(np.concatenate([points, shape.point + 0.1 * rng.standard_normal((900, 3))]), shape)
+    assert not references.borne_out(points[:60], shape)
+
+
+def test_the_noise_of_a_part_is_in_spacings():
+    points = np.column_stack([np.random.default_rng(9).random((20000, 2)), np.zeros(20000)])
+    assert references.noisy(points, 0.0) is points
+    moved = references.noisy(points, 0.2) - points
+    assert moved.std() == pytest.approx(0.2 / np.sqrt(20000), rel=0.1)
+
+
+@pytest.mark.parametrize("program", [real, arcs])
+def test_scans_that_are_not_there_are_asked_for(program, tmp_path, monkeypatch):
+    command = [f"{program.__name__}.py", str(tmp_path / "rows.jsonl"), "--data", str(tmp_path)]
+    monkeypatch.setattr(sys, "argv", command)
+    with pytest.raises(SystemExit, match="give --data the folder"):
+        program.main()
+
+
+def a_part(folder):
+    """Write a plate with a rounded edge and a bore as the only CAD part there is."""
+    rng = np.random.default_rng(10)
+    turn, around = 0.5 * np.pi * rng.random(1500), 2 * np.pi * rng.random(1500)
+    edge = np.column_stack([np.cos(turn), np.sin(turn), 6 * rng.random(1500)])
+    flat = np.column_stack([-6 * rng.random(5000), np.ones(5000), 6 * rng.random(5000)])
+    flat = flat[np.hypot(flat[:, 0] + 3, flat[:, 2] - 3) > 1]
+    side = np.column_stack([np.ones(1500), -2 * rng.random(1500), 6 * rng.random(1500)])
+    bore = np.column_stack([np.cos(around) - 3, 1 - 2 * rng.random(1500), np.sin(around) + 3])
+    (folder / "fit4cad").mkdir()
+    np.savez(folder / "fit4cad" / "PC1.npz", np.concatenate([edge, flat, side, bore]))
+    known = [
+        {"axis_point": [0, 0, 3], "axis_direction": [0, 0, 1], "radius": 1.0},
+        {"axis_point": [-3, 0, 3], "axis_direction": [0, 1, 0], "radius": 1.0},
+    ]
+    (folder / "fit4cad" / "truth.json").write_text(json.dumps({"PC1": known}), encoding="utf-8")
+
+
+@pytest.mark.parametrize("program", [real, arcs])
+def test_rows_of_a_part(program, tmp_path, monkeypatch):
+    a_part(tmp_path)
+    output = tmp_path / "rows.jsonl"
+    command = [f"{program.__name__}.py", str(output), "--data", str(tmp_path), "--noise", "0.1"]
+    monkeypatch.setattr(sys, "argv", command + (["--sources", "fit4cad"] if program is real else []))
+    assert program.main() == 0
+    lines = [json.loads(line) for line in output.read_text(encoding="utf-8").splitlines()]
+    assert {line["scene"] for line in lines} <= {"fit4cad_PC1@0.1"}
+    if program is real:
+        assert {0, 1} & {line["cylinder"] for line in lines if line["label"] == labels.TRUE}
+    terms = evidence_weights.BLEND_TERMS if program is arcs else evidence_weights.TERMS
+    assert all(fit.is_arc(line) == (program is arcs) for line in lines)
+    assert fit.table_of(lines, terms).terms.shape[1] == len(terms)
+
+
+def test_arcs_are_noted_for_a_while_only():
+    before = arcs.rounds.verify
+    with arcs.noted() as found:
+        assert arcs.rounds.verify is not before
+        assert found == []
+    assert arcs.rounds.verify is before
+
+
+@pytest.mark.parametrize("name", things.MORE)
+def test_a_thing_is_its_name_seed_and_noise(name):
+    one, same, other = (things.make(name, seed, 0.001) for seed in (100, 100, 101))
+    assert (one == same).all()
+    assert one.shape != other.shape or (one != other).any()
+    assert np.isfinite(one).all()
+    assert len(one) in things.COUNTS
+
+
+def test_fits_of_a_thing_are_false(tmp_path, monkeypatch):
+    output = tmp_path / "rows.jsonl"
+    command = ["things.py", str(output), "--seeds", "100:101", "--noise", "0.002", "--only", "barrel"]
+    monkeypatch.setattr(sys, "argv", command)
+    assert things.main() == 0
+    lines = [json.loads(line) for line in output.read_text(encoding="utf-8").splitlines()]
+    assert {logistic.kind_of(line["scene"]) for line in lines} == {"thing"}
+    assert {line["label"] for line in lines} == {labels.FALSE}
 
 
 def test_a_picture_is_drawn(tmp_path):

@@ -145,6 +145,13 @@ def test_what_better_ones_have_claimed_is_dropped(parts, kept):
     assert {id(one) for one in drop_claimed(findings, 200)} == {id(findings[k]) for k in kept}
 
 
+def test_what_others_have_claimed_before_is_dropped():
+    findings = claims(((0, 60), 1.0), ((60, 120), 1.0))
+    assert drop_claimed(findings, 200, findings[:1]) == findings[1:]
+    assert drop_claimed(findings, 200, findings) == []
+    assert {id(one) for one in drop_claimed(findings, 200, [])} == {id(one) for one in drop_claimed(findings, 200)}
+
+
 def far_pieces(between, tilt=0.0012):
     """Give what becomes of two pieces so far apart that their directions alone do not say they are one."""
     rng = np.random.default_rng(3)
