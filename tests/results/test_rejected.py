@@ -123,8 +123,11 @@ def test_the_file_is_by_its_schema(found):
 def test_the_keys_are_those_of_a_cylinder_but_for_the_reason(found):
     rejected, cylinder = (Model.of(found).to_object() for Model in (Rejections, Result))
     first, last = rejected["rejected"][0], rejected["rejected"][-1]
-    assert list(first) == ["reason", *(key for key in cylinder["cylinders"][0] if key not in {"id", "uncertainty"})]
-    assert list(last) == [key for key in first if key not in {"confidence", "evidence"}]
+    assert list(first) == [
+        "reason",
+        *(key for key in cylinder["cylinders"][0] if key not in {"id", "side", "uncertainty"}),
+    ]
+    assert list(last) == [key for key in first if key not in {"confidence", "form", "evidence"}]
 
 
 def test_nothing_refused_is_an_empty_list(make_extraction):
