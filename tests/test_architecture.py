@@ -13,6 +13,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 OWN_SECTION = {
     "curvature": "CandidatesConfig",
     "local_slices": "SlicingConfig",
+    "patches": "CandidatesConfig",
 }  # the others are called after their file
 ONLY_IN = {
     "OCP": {"export"},
@@ -31,7 +32,7 @@ ONLY_IN = {
     "trimesh": {"export"},
 }
 NAMES_OF_NO_ROOM = {"base", "common", "core", "helpers", "manager", "misc", "utils"}
-MOST_LINES, MOST_LINES_OF_CODE = 320, 60  # of a file, of a function
+MOST_LINES, MOST_LINES_OF_CODE = 350, 60  # of a file, of a function
 
 
 def room_of(module):
@@ -212,7 +213,7 @@ def test_rooms_within_a_room_make_no_circle():
         ("cylx.attic", "", "a new room"),
         ("cylx.io.utils", "", "'utils' is no name of a room"),
         ("cylx.game.dynamics", "@njit(cache=True)\ndef f(a, b):\n    a[0, :7] = b", "kernel f assigns a slice"),
-        ("cylx.io.ply", "\n" * 321, "321 lines, at most 320"),
+        ("cylx.io.ply", "\n" * 351, "351 lines, at most 350"),
         ("cylx.io.ply", "def f():\n" + "    x = 1\n" * 60, "f has 61 lines of code, at most 60"),
     ],
 )

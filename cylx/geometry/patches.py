@@ -108,24 +108,7 @@ def _fit_patch(
     local: FloatArray,
     patch: FloatArray,
 ) -> None:
-    for d in range(3):
-        total = 0.0
-        for a in range(k):
-            total += points[members[a], d]
-        patch[d] = total / k
-    for d in range(3):
-        for e in range(3):
-            total = 0.0
-            for a in range(k):
-                total += (points[members[a], d] - patch[d]) * (points[members[a], e] - patch[e])
-            matrix[d, e] = total
-    symmetric_eigen(matrix, vectors)
-    least = 0
-    for a in range(1, 3):
-        if matrix[a, a] < matrix[least, least]:
-            least = a
-    for d in range(3):
-        patch[3 + d] = vectors[d, least]
+    _fit_own_plane(points, members, k, matrix, vectors, patch)
     fill_basis(patch[3:6], frame)
     for a in range(6):
         terms[a] = 0.0
@@ -156,6 +139,31 @@ def _fit_patch(
     for a in range(6):
         patch[6 + a] = terms[a]
     patch[12], patch[13], patch[14] = scale, scale * math.sqrt(total / (k - 6)), scale
+
+
+@njit(cache=True, nogil=True)
+def _fit_own_plane(
+    points: FloatArray, members: IndexArray, k: int, matrix: FloatArray, vectors: FloatArray, patch: FloatArray
+) -> None:
+    """Fill in the middle of a patch and the normal of its plane."""
+    for d in range(3):
+        total = 0.0
+        for a in range(k):
+            total += points[members[a], d]
+        patch[d] = total / k
+    for d in range(3):
+        for e in range(3):
+            total = 0.0
+            for a in range(k):
+                total += (points[members[a], d] - patch[d]) * (points[members[a], e] - patch[e])
+            matrix[d, e] = total
+    symmetric_eigen(matrix, vectors)
+    least = 0
+    for a in range(1, 3):
+        if matrix[a, a] < matrix[least, least]:
+            least = a
+    for d in range(3):
+        patch[3 + d] = vectors[d, least]
 
 
 @njit(cache=True, nogil=True)

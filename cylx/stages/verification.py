@@ -14,6 +14,7 @@ import numpy as np
 from cylx.config import VerificationConfig
 from cylx.evidence.measures import (
     TRUNCATED,
+    Shell,
     deviations_of_form,
     distinct_places,
     facets,
@@ -106,6 +107,22 @@ def verify(
     if shell.on.sum() < LEAST_POINTS_TO_MEASURE:
         return Verdict("too few points", 0.0, {}, 0.0, points)
     coverage = covered_angle(shell.angles[shell.on])
+    measures, errors = _measures_of(segment, shell, indexed, coverage, counts)
+    known = {**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff}
+    probability, worst = weigh(known)
+    confidence = round(probability, 3)  # further digits would order equals by chance
+    reason = broken_limit(measures, len(points), coverage, config)
+    if arc:
+        confidence = round(weigh_blend(known), 3)
+    if not reason and confidence < config.min_confidence:
+        reason = worst
+    return Verdict(reason, confidence, measures, coverage, points, *errors, blend=arc)
+
+
+def _measures_of(
+    segment: Segment, shell: Shell, indexed: IndexedCloud, coverage: float, counts: tuple[int, int]
+) -> tuple[dict[str, float], tuple[float, float]]:
+    """Return all that is measured of a segment, and the standard deviations of its axis."""
     radius = segment.radius
     noise = indexed.noise_about(segment.model, segment.half)
     deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
@@ -149,16 +166,7 @@ def verify(
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
     }
-    known = {**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff}
-    probability, worst = weigh(known)
-    confidence = round(probability, 3)  # further digits would order equals by chance
-    reason = broken_limit(measures, len(points), coverage, config)
-    errors = shape["offset_error"], shape["tilt_error"]
-    if arc:
-        confidence = round(weigh_blend(known), 3)
-    if not reason and confidence < config.min_confidence:
-        reason = worst
-    return Verdict(reason, confidence, measures, coverage, points, *errors, blend=arc)
+    return measures, (shape["offset_error"], shape["tilt_error"])
 
 
 def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:
