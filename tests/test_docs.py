@@ -176,7 +176,7 @@ def test_every_measure_of_the_evidence_is_told_of():
     for golden in (ROOT / "sample_data" / "golden").glob("*.json"):
         for cylinder in json.loads(golden.read_text(encoding="utf-8"))["cylinders"]:
             assert set(cylinder.get("evidence", ())) <= set(told)
-    measured = re.search(r"measures = \{\n(.*?)\n    \}", inspect.getsource(verification.verify), re.DOTALL)[1]
+    measured = re.search(r"measures = \{\n(.*?)\n    \}", inspect.getsource(verification), re.DOTALL)[1]
     assert told == re.findall(r'^        "(\w+)": ', measured, re.MULTILINE)
 
 

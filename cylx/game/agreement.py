@@ -139,6 +139,8 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
 @njit(cache=True, nogil=True)
 def _is_off(place: FloatArray, model: FloatArray, reach: float) -> bool:
     """Tell of a window whether it was laid elsewhere than on the surface of a cylinder; not if its place is unknown."""
+    if math.isnan(place[0]):
+        return False
     dx, dy, dz = place[0] - model[0], place[1] - model[1], place[2] - model[2]
     height = dx * model[3] + dy * model[4] + dz * model[5]
     distance = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height))
