@@ -138,11 +138,11 @@ def test_no_scene_helps_to_judge_itself():
     assert scores.average_precision(fair, rows.true[mine]) < 0.9
 
 
-def test_a_false_row_weighs_double():
+def test_a_false_row_weighs_as_much_as_caution_says():
     rows = drawn_rows(np.random.default_rng(5), 4000, -0.5, [2.0])
     twice = np.concatenate([np.arange(4000), np.flatnonzero(~rows.true)])
     cautious, doubled = (
-        logistic.fit_law(rows, np.ones(1)),
+        logistic.fit_law(rows, np.ones(1), caution=2.0),
         logistic.fit_law(rows.subset(twice), np.ones(1), caution=1.0),
     )
     assert cautious.bias == pytest.approx(doubled.bias, abs=0.02)

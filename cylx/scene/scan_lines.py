@@ -20,6 +20,8 @@ SMALL, LARGE = 16, 96
 """Points of a neighbourhood, and of the larger one it is held against."""
 NARROW = 0.3
 """A neighbourhood whose narrower direction is less than this share of its width is a curve."""
+THIN = 0.25
+"""A neighbourhood whose thickness is less than this share of its narrower direction is a plane."""
 TURNED = 0.7
 """Cosine between the planes of a small and of a large neighbourhood, below which the small one is no piece of it."""
 LINES, SURFACES = 0.42, 0.15
@@ -87,7 +89,9 @@ def share_of_lines(points: FloatArray, codes: IndexArray, unit: float, threads: 
     _, widths, axes = _planes(points[np.take_along_axis(near, closest, axis=1)])
     _, _, wider = _planes(points[near])
     curve = widths[:, 1] < NARROW**2 * widths[:, 2]
-    turned = np.abs((axes[:, :, 0] * wider[:, :, 0]).sum(axis=1)) < TURNED
+    # where noise is as large as the neighbourhood, no plane can be told
+    sheet = widths[:, 0] < THIN**2 * widths[:, 1]
+    turned = sheet & (np.abs((axes[:, :, 0] * wider[:, :, 0]).sum(axis=1)) < TURNED)
     return float((curve | turned).mean())
 
 

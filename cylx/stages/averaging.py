@@ -69,8 +69,8 @@ STRUCTURED_LACK_OF_FIT = 1.4
 """A lack of fit (chi-square per cell) beyond this is none by chance."""
 WIDEST_IN_LAST_FIT = 8.0
 """Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
-MOST_FORM = 0.04
-"""Scatter that a surface may have whatever the noise, as a share of the radius."""
+MOST_FORM, MOST_FORM_NOISES = 0.04, 6.0
+"""Scatter that a surface may have beyond that, as a share of the radius, and in noises."""
 ARC_FLAT, ARC_STEPS = 0.2, 4
 """Points of flat windows of this share of what is too flat are not of an arc, and so many fits settle it."""
 LEAST_COSINE = math.cos(math.radians(25.0))
@@ -155,7 +155,7 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
         if not alike or abs(model[DIRECTION] @ first[DIRECTION]) < LEAST_COSINE:
             return "drifted away"
         spread = TUKEY_SPREAD * spread
-        most = max(MOST_SPREAD * noise, MOST_FORM * model[RADIUS])
+        most = max(MOST_SPREAD * noise, min(MOST_FORM * model[RADIUS], MOST_FORM_NOISES * noise))
         heights, angles = points_on(points, model, SURFACE_WIDTH * min(max(spread, noise), most))
         found = visible_extent(heights, angles, half, model[RADIUS], doubt=DOUBT_INSIDE if step else 1.0)
         if found is None:
