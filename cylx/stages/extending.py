@@ -14,6 +14,7 @@ import numpy as np
 
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.geometry.coverage import sector_of
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
 
@@ -35,6 +36,10 @@ WIDEST_GAP_SHARE = 0.5
 """Widest gap, as a share of the added length."""
 MOST_CONFIDENCE_LOST = 0.1
 """Largest allowed loss of confidence of the longer cylinder."""
+
+
+STRIP_SHARE = 0.25
+"""Share of the sectors of the arc that must be filled beyond an end, or of as many sectors as there are points."""
 
 
 def extend(finding: Finding, indexed: IndexedCloud, judge: Judge) -> Finding:
@@ -95,15 +100,24 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
     spread *= TUKEY_SPREAD
     if spread > 1.1 * max(finding.segment.spread, noise):
         return None
-    heights, residuals, _ = coordinates_of(indexed.points, near, longer)
+    heights, residuals, angles = coordinates_of(indexed.points, near, longer)
     on = np.abs(residuals) < 2.0 * noise
     area = 8.0 * noise * longer[RADIUS]  # on the surface, over pi
     share = area / (outer**2 - area)
     low, high = -_end(-heights, on, half, reach, share), _end(heights, on, half, reach, share)
     if low > -half - longer[RADIUS] and high < half + longer[RADIUS]:
         return None
+    for beyond in (on & (heights < -half) & (heights >= low), on & (heights > half) & (heights <= high)):
+        if beyond.any() and _is_strip(angles[beyond], angles[on & (np.abs(heights) <= half)]):
+            return None
     longer[POINT] += 0.5 * (low + high) * longer[DIRECTION]
     return Segment(longer, 0.5 * (high - low), spread)
+
+
+def _is_strip(beyond: FloatArray, before: FloatArray) -> bool:
+    """Tell whether points beyond an end cover so little of the arc that something else runs beside the cylinder."""
+    filled, expected = len(np.unique(sector_of(beyond))), len(np.unique(sector_of(before)))
+    return filled < STRIP_SHARE * min(expected, len(beyond))
 
 
 def _end(heights: FloatArray, on: MaskArray, half: float, reach: float, share: float) -> float:
