@@ -130,28 +130,29 @@ def _height(measures: Mapping[str, float]) -> float:
     return max(measures["height_radii"], 0.05)
 
 
-BIAS = -2.307
+BIAS = -2.253
 TERMS = (
     # what its form is like
-    Term("form", -1.799, 0.16, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
-    Term("other shape", -9.115, 0.02, _explained),
-    Term("lack of fit", -0.692, 0.16, _misfit),
-    Term("facets", -4.195, 0.01, _facets),
+    Term("form", -1.813, 0.16, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("other shape", -9.153, 0.02, _explained),
+    Term("lack of fit", -0.650, 0.16, _misfit),
+    Term("facets", -4.252, 0.01, _facets),
     # other points inside and just outside, and going on past an end of the arc or off to one side
-    Term("inside", -1.432, 0.05, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -1.648, 0.28, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("tangent", -2.319, 0.03, lambda m: min(m["tangent"], 1.5)),
-    Term("flank", -15.243, 0.00, _flank),
+    Term("inside", -1.427, 0.05, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -1.649, 0.28, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("tangent", -2.368, 0.03, lambda m: min(m["tangent"], 1.5)),
+    Term("flank", -14.894, 0.00, _flank),
     # how much of a cylinder is there at all
-    Term("few points", 2.842, -0.02, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
-    Term("curvature", 1.626, 1.57, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
+    Term("few points", 2.865, -0.02, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
+    Term("few lines", 2.540, -0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
+    Term("curvature", 1.623, 1.57, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
     # what the candidates say
-    Term("payoff", 3.156, 0.83, _payoff),
-    Term("agreement", 3.675, 0.38, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
+    Term("payoff", 3.114, 0.83, _payoff),
+    Term("agreement", 3.660, 0.38, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
     # cones, barrels, elbows
     Term("slope", -25.0, 0.00, _slope),
-    Term("bulge", -13.013, 0.01, _bulge),
-    Term("bend", -22.728, 0.00, _bend),
+    Term("bulge", -13.162, 0.01, _bulge),
+    Term("bend", -22.869, 0.00, _bend),
 )
 
 BLEND_BIAS = -12.702
@@ -200,7 +201,7 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     >>> pipe = dict(lack_of_fit=1.0, structure_radii=0.0, explained=0.0, inside=0.0, outside=0.0, tangent=0.0,
     ...             flank=0.0, coverage=6.0, facets=0.0, prism=0.0, roughness=1.0, inliers=2000.0, curvature=500.0,
     ...             height_radii=9.0, payoff=0.8, agreement=0.95, scatter_radii=0.01, slope=0.0, slope_error=0.001,
-    ...             bulge=0.0, bend=0.0, bend_error=0.001)
+    ...             bulge=0.0, bend=0.0, bend_error=0.001, places=12.0)
     >>> weigh(pipe)[0] > 0.99
     True
     >>> confidence, worst = weigh({**pipe, "agreement": 0.1, "payoff": 0.3})
