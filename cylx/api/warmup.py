@@ -40,7 +40,7 @@ def compile_kernels(observer: Observer) -> None:
 
 
 def kernels_are_cold() -> bool:
-    """Tell whether the kernels have yet to be compiled: the smallest of them is called, and says where it came from."""
+    """Return whether the kernels have yet to be compiled: the smallest of them is called, and says where it came from."""
     before = sum(find_cell.stats.cache_misses.values())
     find_cell(np.zeros(1, np.int64), 0)
     return bool(sum(find_cell.stats.cache_misses.values()) > before)
@@ -52,7 +52,7 @@ def kernel_folder() -> str:
 
 
 def practice_cloud() -> FloatArray:
-    """Give a small cloud that calls every kernel: two cylinders and a floor, shape (N, 3)."""
+    """Return a small cloud that calls every kernel: two cylinders and a floor, shape (N, 3)."""
     rng = np.random.default_rng(0)
     turn, height = 2.0 * np.pi * rng.random(2500), 4.0 * rng.random(2500)
     cylinder = np.column_stack([np.cos(turn), np.sin(turn), height])
@@ -111,7 +111,7 @@ def _practice_frame(points: FloatArray) -> Frame:
 
 
 def _practice_candidates(frame: Frame) -> Candidates:
-    """Give candidates of the two cylinders of the practice cloud."""
+    """Return candidates of the two cylinders of the practice cloud."""
     rng = np.random.default_rng(1)
     models = np.empty((60, 7))
     models[:, POINT] = np.column_stack([4.0 * (np.arange(60) % 2), np.zeros(60), 4.0 * rng.random(60)])

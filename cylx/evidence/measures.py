@@ -63,7 +63,7 @@ class Shell:
     deviation: float
 
     def thinned(self, stride: int) -> Shell:
-        """Give every so manyth point: shares and shapes stay, and cost what they should."""
+        """Return every so manyth point: shares and shapes stay, and cost what they should."""
         return Shell(
             self.indices[::stride],
             self.heights[::stride],
@@ -142,7 +142,7 @@ def distinct_places(angles: FloatArray, radius: float, deviation: float) -> floa
 
 
 def _dense(ordered: FloatArray, reach: float) -> MaskArray:
-    """Tell which of sorted angles have so many others within reach that they do not lie between lines."""
+    """Return which of sorted angles have so many others within reach that they do not lie between lines."""
     near = np.searchsorted(ordered, ordered + reach, "right") - np.searchsorted(ordered, ordered - reach)
     usual = 2.0 * reach * len(ordered) / max(float(ordered[-1] - ordered[0]), 2.0 * reach, 1e-300)
     return np.asarray(near >= SPARSE * usual, dtype=np.bool_)
@@ -184,7 +184,7 @@ def _inverse(gram: FloatArray) -> FloatArray:
 
 
 def _bend(gram: FloatArray, right: FloatArray) -> tuple[float, float]:
-    """Give how far the axis is off the straight at the ends, and the standard error of that for unit noise."""
+    """Return how far the axis is off the straight at the ends, and the standard error of that for unit noise."""
     which = np.array([0, 1, 2, 3, 4, 7, 8])
     inverse = _inverse(gram[np.ix_(which, which)])
     aside = (inverse @ right[which])[5:]

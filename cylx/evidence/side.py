@@ -57,7 +57,7 @@ class _Around(NamedTuple):
 
 
 def side_of(segment: Segment, indexed: IndexedCloud, coverage: float) -> Side:
-    """Tell from which side the surface of a segment is seen, from what lies about it.
+    """Return from which side the surface of a segment is seen, from what lies about it.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def _look_around(segment: Segment, indexed: IndexedCloud) -> _Around | None:
 
 
 def _adjoins(around: _Around, end: int, way: int) -> bool:
-    """Tell whether a surface across the axis adjoins an end (-1, 1), inwards (-1) or outwards (1)."""
+    """Return whether a surface across the axis adjoins an end (-1, 1), inwards (-1) or outwards (1)."""
     unit = 1.0 / math.sqrt(around.density)  # the spacing on this surface, of the points that are looked at
     thick = max(around.gap, RIM * unit)
     past = end * around.heights - around.half
@@ -129,7 +129,7 @@ def _adjoins(around: _Around, end: int, way: int) -> bool:
 
 
 def _goes_on(around: _Around, way: int) -> bool:
-    """Tell whether there is a further surface beyond an end, nearer to the axis (-1) or farther from it (1)."""
+    """Return whether there is a further surface beyond an end, nearer to the axis (-1) or farther from it (1)."""
     past = np.abs(around.heights) - around.half
     unit = 1.0 / math.sqrt(around.density)
     first = max(around.gap, RIM * unit, RIM_RADII * around.radius)
@@ -141,7 +141,7 @@ def _goes_on(around: _Around, way: int) -> bool:
 
 
 def _fills(around: _Around, band: MaskArray, way: int, width: float, least: float = FILLED) -> bool:
-    """Tell whether points of a band lie inside (-1) or outside (1) the surface in most of the covered sectors."""
+    """Return whether points of a band lie inside (-1) or outside (1) the surface in most of the covered sectors."""
     off = way * around.residuals
     ring = band & (off > around.gap) & (off < around.gap + width)
     first = around.radius + way * around.gap
@@ -153,7 +153,7 @@ def _fills(around: _Around, band: MaskArray, way: int, width: float, least: floa
 
 
 def _share(around: _Around, way: int) -> float:
-    """Give the points inside (-1) or outside (1), away from the ends, as a share of those on the surface.
+    """Return the points inside (-1) or outside (1), away from the ends, as a share of those on the surface.
 
     Walls about the same axis are no things.
     """
@@ -171,7 +171,7 @@ def _things(around: _Around, way: int) -> MaskArray:
 
 
 def _has_wall(around: _Around, way: int) -> bool:
-    """Tell whether a wall about the same axis holds most of what is inside (-1) or outside (1)."""
+    """Return whether a wall about the same axis holds most of what is inside (-1) or outside (1)."""
     off = way * around.residuals
     middle = (np.abs(around.heights) <= MIDDLE * around.half) & (off > around.gap)
     depths = np.sort(off[middle])

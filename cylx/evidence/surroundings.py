@@ -25,7 +25,7 @@ ARC_SHARE = 0.3
 
 
 def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
-    """Give points inside and just outside as shares of those on the surface, medians over pieces of the height.
+    """Return points inside and just outside as shares of those on the surface, medians over pieces of the height.
 
     Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
     """
@@ -46,7 +46,7 @@ def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
 
 
 def _on_inner_wall(shell: Shell, inside: MaskArray, radius: float) -> MaskArray:
-    """Tell which of the points inside lie on a cylinder about the same axis: the inner wall of a tube or of a mug."""
+    """Return which of the points inside lie on a cylinder about the same axis: the inner wall of a tube or of a mug."""
     where = np.flatnonzero(inside)
     none = np.zeros(len(inside), np.bool_)
     if len(where) < LEAST_ON:
@@ -65,7 +65,7 @@ def _on_inner_wall(shell: Shell, inside: MaskArray, radius: float) -> MaskArray:
 
 
 def continuation(shell: Shell, radius: float) -> tuple[float, float]:
-    """Give the density of points that go on tangentially past an end of the arc, as a share of the arc's own.
+    """Return the density of points that go on tangentially past an end of the arc, as a share of the arc's own.
 
     A rounded edge of a box goes on as its two sides, of which one may be hidden; a pipe ends.
 
@@ -108,7 +108,7 @@ def continuation(shell: Shell, radius: float) -> tuple[float, float]:
 
 
 def flank(shell: Shell, radius: float) -> float:
-    """Give how densely points lie on a half plane that touches the cylinder and goes off to one side.
+    """Return how densely points lie on a half plane that touches the cylinder and goes off to one side.
 
     Sides of edges and plates are such half planes. A point beyond the surface lies on two tangents, one that touches it
     to its left and one to its right; of all points of a half plane, one of the two touches at the same place, and what
@@ -154,7 +154,7 @@ def flank(shell: Shell, radius: float) -> float:
 
 
 def _longest_run(filled: MaskArray) -> tuple[int, int]:
-    """Give start and length of the longest cyclic run of True; not all are True."""
+    """Return start and length of the longest cyclic run of True; not all are True."""
     best = (0, 0)
     count = len(filled)
     for start in np.flatnonzero(filled & ~np.roll(filled, 1)):

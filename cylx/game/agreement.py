@@ -138,7 +138,7 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
 
 @njit(cache=True, nogil=True)
 def _is_off(place: FloatArray, model: FloatArray, reach: float) -> bool:
-    """Tell of a window whether it was laid elsewhere than on the surface of a cylinder; not if its place is unknown."""
+    """Return whether a window was laid elsewhere than on the surface of a cylinder; not if its place is unknown."""
     if math.isnan(place[0]):
         return False
     dx, dy, dz = place[0] - model[0], place[1] - model[1], place[2] - model[2]

@@ -205,7 +205,7 @@ def _has_ended(process: int) -> bool:
 
 @contextmanager
 def _staged(target: Path, suffix: str) -> Iterator[Path]:
-    """Give a temporary name, which becomes that of `target` if all goes well."""
+    """Return a temporary name, which becomes that of `target` if all goes well."""
     temporary = temporary_beside(target, suffix)
     try:
         yield temporary

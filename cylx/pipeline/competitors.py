@@ -76,7 +76,7 @@ def _proposals(prepared: Prepared, log: StageLog) -> Iterable[Proposal]:
 
 
 def _with_extent(proposal: Proposal, indexed: IndexedCloud, prepared: Prepared) -> Finding | RejectedSegment:
-    """Give a cylinder the extent that is seen of it, or else that of what it was found on; hold it to the limits."""
+    """Return a cylinder the extent that is seen of it, or else that of what it was found on; hold it to the limits."""
     segment, support = proposal
     if reason := out_of_range(segment, prepared.radii, prepared.config.scene):
         return RejectedSegment(segment, reason, support, 0.0)

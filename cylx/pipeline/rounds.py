@@ -212,7 +212,7 @@ class Rounds:
         return finding if isinstance(fitted, str) else replace(finding, segment=fitted)
 
     def _enough(self) -> bool:
-        """Tell whether to stop early: the paper's order is that of the clusters, ours that of the cylinders."""
+        """Return whether to stop early: the paper's order is that of the clusters, ours that of the cylinders."""
         most = self._config.max_cylinders
         return most is not None and not self._config.averaging.merge and len(self.findings) >= most
 

@@ -106,12 +106,12 @@ def fit_cylinder(points: ArrayLike | PointCloud, *, start: Cylinder | None = Non
 
 
 def _as_model(cylinder: Cylinder) -> FloatArray:
-    """Give point, direction and radius as one array (7,)."""
+    """Return point, direction and radius as one array (7,)."""
     return np.concatenate([cylinder.point, cylinder.direction, [cylinder.radius]])
 
 
 def _starts(points: FloatArray) -> list[FloatArray]:
-    """Give rough cylinders (7,), the best first: the circles that the points are nearest to, seen along an axis."""
+    """Return rough cylinders (7,), the best first: the circles that the points are nearest to, seen along an axis."""
     sample = points
     if len(points) > ENOUGH_TO_COMPARE_DIRECTIONS:
         sample = points[np.random.default_rng(0).choice(len(points), ENOUGH_TO_COMPARE_DIRECTIONS, replace=False)]
@@ -126,7 +126,7 @@ def _starts(points: FloatArray) -> list[FloatArray]:
 
 
 def _sphere(count: int) -> FloatArray:
-    """Give unit vectors (count, 3), evenly over the half sphere, on a spiral."""
+    """Return unit vectors (count, 3), evenly over the half sphere, on a spiral."""
     heights = (np.arange(count) + 0.5) / count
     turns = np.arange(count) * math.pi * (3.0 - math.sqrt(5.0))
     wide = np.sqrt(1.0 - heights**2)
@@ -134,7 +134,7 @@ def _sphere(count: int) -> FloatArray:
 
 
 def _about(direction: FloatArray, cone: float) -> FloatArray:
-    """Give unit vectors (24, 3) about one, within an angle."""
+    """Return unit vectors (24, 3) about one, within an angle."""
     first, second = axis_basis(direction)
     turns = np.linspace(0.0, 2.0 * math.pi, 12, endpoint=False)
     tilts = cone * np.concatenate([[0.5 * np.cos(turns), 0.5 * np.sin(turns)], [np.cos(turns), np.sin(turns)]], axis=1)

@@ -129,7 +129,7 @@ TOO_FLAT = 2.0
 
 
 def cell_keys(cells: IndexArray) -> IndexArray:
-    """Give one number for each cell (n, 3), shape (n,)."""
+    """Return one number for each cell (n, 3), shape (n,)."""
     low = cells & 0x1FFFFF
     return np.asarray((low[:, 0] << 42) | (low[:, 1] << 21) | low[:, 2], dtype=np.int64)
 
@@ -165,15 +165,15 @@ class Noise:
     patches: FloatArray = field(default_factory=lambda: np.empty((0, 5)))
 
     def at(self, size: float) -> float:
-        """Give the usual standard deviation over a piece of this radius; ends of the table hold beyond them."""
+        """Return the usual standard deviation over a piece of this radius; ends of the table hold beyond them."""
         return float(np.exp(np.interp(np.log(max(size, 1e-300)), np.log(self.sizes), np.log(self.deviations))))
 
     def about(self, places: FloatArray, size: float) -> FloatArray:
-        """Give the standard deviations over pieces of this radius at places (n, 3), shape (n,)."""
+        """Return the standard deviations over pieces of this radius at places (n, 3), shape (n,)."""
         return self.at(size) * self.factors_at(places)
 
     def factors_at(self, places: FloatArray, unknown: float = 1.0) -> FloatArray:
-        """Give how many times the usual the noise is at places (n, 3), shape (n,); `unknown` where nobody knows."""
+        """Return how many times the usual the noise is at places (n, 3), shape (n,); `unknown` where nobody knows."""
         out = np.full(len(places), unknown)
         if len(self.cells):
             keys = cell_keys(np.floor(places / self.side).astype(np.int64))
@@ -225,13 +225,13 @@ class Frame:
     spacing: float
 
     def window_radii(self, factor: float) -> list[float]:
-        """Give the radii of windows of all scales, ascending, up to an eighth of the cloud's extent."""
+        """Return the radii of windows of all scales, ascending, up to an eighth of the cloud's extent."""
         extent = extent_of(self.points)
         steps = max(1, math.ceil(math.log(max(extent / 8.0 / self.window, 1.0)) / math.log(factor)) + 1)
         return [self.window * factor**k for k in range(steps)]
 
     def to_scene(self, cylinder: Cylinder) -> Cylinder:
-        """Give a cylinder of the frame in scene units."""
+        """Return a cylinder of the frame in scene units."""
         return cylinder.moved(self.origin, self.spacing)
 
 
@@ -267,7 +267,7 @@ class IndexedCloud:
         return self.cells.points
 
     def noise_about(self, model: FloatArray, half: float = 0.0) -> float:
-        """Give the noise over the surface of a cylinder (7,), a piece as large as its diameter.
+        """Return the noise over the surface of a cylinder (7,), a piece as large as its diameter.
 
         Its own patches of surface say whether it is noisier than usual: a camera sees steep sides less exactly than the
         floor. Patches that are not small against the cylinder show its curvature rather than noise.
@@ -280,7 +280,7 @@ class IndexedCloud:
         return usual * min(own, MOST_NOISE) if own > 1.2 else usual
 
     def may_be_on(self, indices: IndexArray, model: FloatArray, share: float = 1.0) -> MaskArray:
-        """Tell which points may lie on a cylinder (7,).
+        """Return which points may lie on a cylinder (7,).
 
         Those in large flat windows belong to something flatter; those whose normal is not radial, to what meets it.
         """
@@ -290,7 +290,7 @@ class IndexedCloud:
         return may
 
     def too_flat(self, radius: float) -> float:
-        """Give the flatness from which a point belongs to something flatter than a cylinder of this radius."""
+        """Return the flatness from which a point belongs to something flatter than a cylinder of this radius."""
         return TOO_FLAT * radius
 
 
@@ -315,7 +315,7 @@ def _drop_not_radial(
 
 @njit(cache=True, nogil=True)
 def _noise_on(patches: FloatArray, model: FloatArray, half: float, width: float) -> tuple[float, int]:
-    """Give the median noise of the patches on a cylinder's surface that are small against it, and their number."""
+    """Return the median noise of the patches on a cylinder's surface that are small against it, and their number."""
     values, n = np.empty(len(patches)), np.int64(0)
     for i in range(len(patches)):
         if patches[i, 3] * SMALL_PATCH >= model[RADIUS]:

@@ -63,7 +63,7 @@ def nearest_points(
     size: int,
     threads: int,
 ) -> tuple[IndexArray, FloatArray]:
-    """Give the `size` nearest neighbours of each sample point, itself among them, and the distance of the last."""
+    """Return the `size` nearest neighbours of each sample point, itself among them, and the distance of the last."""
     near, radius = np.empty((len(sample), size + 1), np.int64), np.empty(len(sample))
 
     def work(part: slice) -> None:

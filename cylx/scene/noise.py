@@ -176,7 +176,7 @@ def _noise_of_fine(
     least: float,
     threads: int,
 ) -> float | None:
-    """Give the noise over the smallest neighbourhoods; None if few of them are pieces of a surface."""
+    """Return the noise over the smallest neighbourhoods; None if few of them are pieces of a surface."""
     size = min(FINE, len(points) - 1)
     if size < 9:
         return None

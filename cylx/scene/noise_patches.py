@@ -12,7 +12,7 @@ MAD_SHRINKAGE = 0.93
 
 
 def half_sample_mode(values: FloatArray) -> float:
-    """Give the mode of positive values: the half-sample mode of their logarithms.
+    """Return the mode of positive values: the half-sample mode of their logarithms.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ FINEST = 3.0, 0.15
 
 
 def finest_mode(values: FloatArray, least: float) -> float:
-    """Give the lowest mode that a good share of the values has; what is below `least` counts as that."""
+    """Return the lowest mode that a good share of the values has; what is below `least` counts as that."""
     kept = np.maximum(values, least)
     mode = half_sample_mode(kept)
     while True:
@@ -114,7 +114,7 @@ def rod_spread(long: FloatArray, near: FloatArray) -> tuple[FloatArray, NDArray[
 
 
 def core_spread(patches: FloatArray) -> FloatArray:
-    """Give the scatter of the core of each patch about its quadric, by the median: outliers move it little."""
+    """Return the scatter of the core of each patch about its quadric, by the median: outliers move it little."""
     design, height, _, _ = _over_own_plane(patches)
     weights = np.ones_like(height)
     residuals = height
@@ -131,7 +131,7 @@ def core_spread(patches: FloatArray) -> FloatArray:
 
 
 def _over_own_plane(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Give design matrix (m, k, 6), heights (m, k), in-plane rms and the least rms in the plane, (m,), of patches."""
+    """Return design matrix (m, k, 6), heights (m, k), in-plane rms and the least rms in the plane, (m,), of patches."""
     offsets = patches - patches.mean(axis=1, keepdims=True)
     _, axes = np.linalg.eigh(offsets.transpose(0, 2, 1) @ offsets)
     height, x, y = (axes.transpose(0, 2, 1) @ offsets.transpose(0, 2, 1)).transpose(1, 0, 2)
@@ -143,7 +143,7 @@ def _over_own_plane(patches: FloatArray) -> tuple[FloatArray, FloatArray, FloatA
 
 
 def _residuals(design: FloatArray, height: FloatArray, weights: FloatArray) -> FloatArray:
-    """Give the residuals of one weighted least-squares fit a patch: design (m, k, 6), height and weights (m, k)."""
+    """Return the residuals of one weighted least-squares fit a patch: design (m, k, 6), height and weights (m, k)."""
     weighted = design * weights[..., None]
     gram = weighted.transpose(0, 2, 1) @ design
     gram += 1e-9 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(6)
@@ -152,7 +152,7 @@ def _residuals(design: FloatArray, height: FloatArray, weights: FloatArray) -> F
 
 
 def _masked_median(values: FloatArray, mask: MaskArray) -> FloatArray:
-    """Give the median of the masked values of each row, shape (m, 1); each row has some."""
+    """Return the median of the masked values of each row, shape (m, 1); each row has some."""
     ordered = np.sort(np.where(mask, values, np.inf), axis=1)
     count = np.maximum(mask.sum(axis=1, keepdims=True), 1)
     low, high = (np.take_along_axis(ordered, half, axis=1) for half in ((count - 1) // 2, count // 2))

@@ -221,7 +221,7 @@ def narrow_to_arc(segment: Segment, indexed: IndexedCloud) -> Segment | str:
 
 
 def inflation(measures: Mapping[str, float]) -> float:
-    """Tell how many times larger a covariance is than noise makes it, from what the verification measured.
+    """Return how many times larger a covariance is than noise makes it, from what the verification measured.
 
     Where the residuals are structured beyond noise, because the object is no perfect cylinder or its noise is shared by
     neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
@@ -316,7 +316,7 @@ def _turn_as_given(model: FloatArray) -> None:
 
 
 def _shell(segment: Segment, indexed: IndexedCloud, most: int | None) -> tuple[FloatArray, float]:
-    """Give the points about the surface of a segment, and how near to it those lie that have a say at first."""
+    """Return the points about the surface of a segment, and how near to it those lie that have a say at first."""
     width = max(SHELL_OF_FIT * indexed.noise_about(segment.model, segment.half), LEAST_SHELL_OF_FIT * segment.radius)
     end = FIT_BEYOND_ENDS * segment.half
     return _own_points(indexed, segment.model, end, 2.0 * width, most, segment.flat_share), width
@@ -337,7 +337,7 @@ def _robust_fit(
 def _own_points(
     indexed: IndexedCloud, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
 ) -> FloatArray:
-    """Give the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
+    """Return the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
     limit = strict * indexed.too_flat(model[RADIUS])
     if indexed.normals is None:
         return indexed.cells.surface_points(model, half, width, most, indexed.flatness, limit)

@@ -216,7 +216,7 @@ def _mark_explained(
 
 
 def _mark_flat(frame: Frame, scale: Scale, seeds: IndexArray, planes: FloatArray, flatness: FloatArray) -> None:
-    """Give the points about flat windows, within three noises of their planes, the radius of the window."""
+    """Return the points about flat windows, within three noises of their planes, the radius of the window."""
     cells, starts = cell_starts(frame.codes, scale.level + CELL)
     places = scale.points[seeds]
     widths = 3.0 * frame.noise.about(places, 2.0 * scale.radius)

@@ -115,7 +115,7 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
 
 
 def _is_strip(beyond: FloatArray, before: FloatArray) -> bool:
-    """Tell whether points beyond an end cover so little of the arc that something else runs beside the cylinder."""
+    """Return whether points beyond an end cover so little of the arc that something else runs beside the cylinder."""
     filled, expected = len(np.unique(sector_of(beyond))), len(np.unique(sector_of(before)))
     return filled < STRIP_SHARE * min(expected, len(beyond))
 

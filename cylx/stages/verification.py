@@ -170,7 +170,7 @@ def _measures_of(
 
 
 def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:
-    """Tell whether a segment goes on tangentially past an end of its arc.
+    """Return whether a segment goes on tangentially past an end of its arc.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:
 
 
 def broken_limit(measures: dict[str, float], count: int, coverage: float, config: VerificationConfig) -> str:
-    """Give the name of a limit the user has set that is not kept, or nothing."""
+    """Return the name of a limit the user has set that is not kept, or nothing."""
     limits = {
         "too few points": count < config.min_inliers,
         "coverage": coverage < math.radians(config.min_coverage_deg),
