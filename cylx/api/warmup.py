@@ -40,7 +40,7 @@ def compile_kernels(observer: Observer) -> None:
 
 
 def kernels_are_cold() -> bool:
-    """Return whether the kernels have yet to be compiled: the smallest of them is called, and says where it came from."""
+    """Return whether kernels have yet to be compiled: the smallest of them is called, and says where it came from."""
     before = sum(find_cell.stats.cache_misses.values())
     find_cell(np.zeros(1, np.int64), 0)
     return bool(sum(find_cell.stats.cache_misses.values()) > before)

@@ -337,7 +337,7 @@ def _robust_fit(
 def _own_points(
     indexed: IndexedCloud, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
 ) -> FloatArray:
-    """Return the points near a cylinder's surface that do not belong to something much flatter, about `most` of them."""
+    """Return points near a cylinder's surface not of something flatter, about `most` of them."""
     limit = strict * indexed.too_flat(model[RADIUS])
     if indexed.normals is None:
         return indexed.cells.surface_points(model, half, width, most, indexed.flatness, limit)
