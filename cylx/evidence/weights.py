@@ -11,7 +11,9 @@ a depth camera; solids that are nearly cylinders; rooms full of pipes and noise;
 Scans of others: CAD parts of Fit4CAD with noise of 0, 0.05, 0.2 and 0.5 spacings, depth-camera scenes of the Object
 Segmentation Database, stems and columns. Each kind weighs the same but racks and single things (twice), depth cameras
 (1.5 times) and stems (three times); false fits weigh 1.4 times as much as true ones. `tests/training` collects the fits
-and fits the weights; that of the slope was raised from 17 to 25 by hand, with the stalk of a banana in view. No term
+and fits the weights; the numbers here come
+from rows of several versions of the engine, those of the CAD parts the oldest, and that of the slope was raised from 17
+to 25 by hand, with the stalk of a banana in view. No term
 may speak against its own meaning: the signs are fixed before the fit. Fits near a true cylinder that were neither
 clearly it nor clearly another were left out, and so were arcs that go on tangentially: these have weights of their own,
 from the same CAD parts.

@@ -13,9 +13,9 @@ CAUTION = 1.4
 and a cylinder that is not there does more harm than one that is missed."""
 
 
-KIND_WEIGHTS = {"plant": 2.0, "depth": 1.5, "wild": 3.0}
-"""What racks of pipes, scenes of depth cameras, and stems count beside other kinds, which count one: they are what the
-method is for, and there are few of them."""
+KIND_WEIGHTS = {"plant": 2.0, "thing": 2.0, "depth": 1.5, "wild": 3.0}
+"""What racks of pipes, single things, depth-camera scenes and stems count beside other kinds, which count one: they are
+what the method is for, and there are few of them."""
 
 
 class Rows(NamedTuple):
