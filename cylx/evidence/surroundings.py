@@ -24,31 +24,47 @@ ARC_SHARE = 0.3
 """Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
 
 
-def emptiness(shell: Shell, radius: float) -> tuple[float, float]:
+LEAST_OF_MEAN = 0.5
+"""Pieces of the height count as if they held this share of what they hold on the average."""
+END, END_DEVIATIONS, MOST_END = 0.02, 4.0, 0.4
+"""Caps and plates lie within this share of half the height and so many deviations of an end, within limits."""
+
+
+def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     """Return points inside and just outside as shares of those on the surface, medians over pieces of the height.
 
     Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
     """
     piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES_OF_HEIGHT).astype(np.int64), 0, PIECES_OF_HEIGHT - 1)
-    outer = max(0.5 * radius, 10.0 * shell.deviation)
+    piece[np.abs(shell.heights) > 1.0 - _end_of(shell, half)] = PIECES_OF_HEIGHT
+    # what lies beside a disc further off than it is high is another thing, and there is much of it
+    beside = max(half, 10.0 * shell.deviation)
+    outer = min(max(0.5 * radius, 10.0 * shell.deviation), beside)
     on = np.abs(shell.residuals) < 3.0 * shell.deviation
-    inside = shell.residuals < -4.0 * shell.deviation
+    inside = (shell.residuals < -4.0 * shell.deviation) & (shell.residuals > -beside)
     outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
-    inside &= ~_on_inner_wall(shell, inside, radius)
-    counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT) for mask in (on, inside, outside)]
+    inside &= ~_on_other_wall(shell, inside, radius)
+    outside &= ~_on_other_wall(shell, outside, radius)
+    counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT + 1) for mask in (on, inside, outside)]
+    if counts[0][:-1].any():  # caps and plates lie at the ends
+        counts = [count[:-1] for count in counts]
     full = counts[0] >= 1
     if not full.any():
         return 1.0, 1.0
-    return (
-        float(np.median(counts[1][full] / counts[0][full])),
-        float(np.median(counts[2][full] / counts[0][full])),
-    )
+    # the points of a short cylinder may lie on a few circles
+    usual = np.maximum(counts[0][full], LEAST_OF_MEAN * counts[0].mean())
+    return float(np.median(counts[1][full] / usual)), float(np.median(counts[2][full] / usual))
 
 
-def _on_inner_wall(shell: Shell, inside: MaskArray, radius: float) -> MaskArray:
-    """Return which of the points inside lie on a cylinder about the same axis: the inner wall of a tube or of a mug."""
-    where = np.flatnonzero(inside)
-    none = np.zeros(len(inside), np.bool_)
+def _end_of(shell: Shell, half: float) -> float:
+    """Return the share of half the height that a cap or a plate at its end takes."""
+    return min(END + END_DEVIATIONS * shell.deviation / max(half, 1e-300), MOST_END)
+
+
+def _on_other_wall(shell: Shell, aside: MaskArray, radius: float) -> MaskArray:
+    """Return which of the points inside or outside lie on a cylinder about the same axis: other wall of tube or mug."""
+    where = np.flatnonzero(aside)
+    none = np.zeros(len(aside), np.bool_)
     if len(where) < LEAST_ON:
         return none
     where = where[np.argsort(shell.residuals[where], kind="stable")]

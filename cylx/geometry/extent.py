@@ -17,6 +17,8 @@ FAINT = 0.2
 """A piece with less than this share of the mean of the known part's pieces shows another, passing object."""
 FULL_PIECE = 12.0
 """Number of points that a piece of the height should hold."""
+LEAP = 4.0
+"""A gap is bridged if it is no longer than so many times what was filled before it: two discs on one axis are no pipe."""
 LONE = 6.0
 """An outermost point is a stray if the third point from the end lies further in by more than this many usual gaps; with
 evenly spread points one in sixty does."""
@@ -147,16 +149,18 @@ def _choose_run(
     usual = median_of_positive(inside, n, scratch)
     if usual == 0.0:
         usual = 1.0
-    best, start, stop, last, most = -1, -1, -1, -1, -math.inf
+    best, start, stop, last, held, most = -1, -1, -1, -1, 0, -math.inf
     for p in range(pieces + 1):
         if p < pieces and shares[p] < filled[p] * usual:
             continue
-        if start >= 0 and (p == pieces or p - last > bridge / piece + 1.0):
+        longest = min(bridge / piece, LEAP * held) + 1.0
+        if start >= 0 and (p == pieces or p - last > longest):
             overlap = min((first + last + 1) * piece, half) - max((first + start) * piece, -half)
             if overlap > most:
                 best, stop, most = start, last, overlap
             start = -1
         if p < pieces:
+            held = 1 if start < 0 else held + 1
             start = p if start < 0 else start
             last = p
     return best, stop

@@ -9,11 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
+import numpy as np
+
 from cylx.game.agreement import Neighbourhood, is_contradicted
 from cylx.geometry.arrays import FloatArray
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
+from cylx.stages.consensus import is_on, of_one_surface
 from cylx.stages.averaging import average_cluster, finish, inflation, narrow_to_arc, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.extending import extend
@@ -28,6 +31,8 @@ FOUND_BEFORE = "found before"
 """The reason of a segment that is one of those accepted already; it is no other cylinder."""
 
 
+OTHER_WALL = 0.03
+"""A window further off a surface than this share of its radius, and than five deviations, was laid on another wall."""
 ROUND = 16
 """Clusters fitted at the same time; the number does not depend on that of the threads, and so the result does not."""
 
@@ -100,10 +105,24 @@ class Rounds:
             if cluster is None:
                 break
             average = average_cluster(self._game.candidates, cluster, self._config.averaging)
+            if self._removes:
+                split = of_one_surface(self._game.candidates, cluster, average, self._indexed)
+                if split is not None:
+                    cluster, others = split
+                    average = average_cluster(self._game.candidates, cluster, self._config.averaging)
+                    self._game.restore(others)
             clusters.append((cluster, average))
             if self._removes:
-                self._game.withdraw(self._game.explained_by(average, closely=True))
+                self._withdraw(average, closely=True)
         return clusters
+
+    def _withdraw(self, segment: Segment, *, closely: bool) -> None:
+        """Take the candidates that a segment explains out of the game, but for those of another wall about its axis."""
+        explained = self._game.explained_by(segment, closely=closely)
+        places = self._game.candidates.places[explained]
+        noise = self._indexed.noise_about(segment.model, segment.half)
+        width = max(5.0 * max(noise, segment.spread), OTHER_WALL * segment.radius)
+        self._game.withdraw(explained[np.isnan(places[:, 0]) | is_on(places, segment.model, width)])
 
     def fit(self, clusters: list[tuple[Cluster, Segment]]) -> list[Fitted | RejectedSegment]:
         """Fit the averages of clusters to the cloud, over threads."""
@@ -123,7 +142,8 @@ class Rounds:
 
     def verify(self, segments: list[Fitted | RejectedSegment], log: StageLog) -> None:
         """Judge the fitted segments, over threads; take what the accepted ones explain out of the game."""
-        for outcome in self._over_threads(lambda one: self._judge(*one) if isinstance(one, Fitted) else one, segments):
+        judged = self._over_threads(lambda one: self._judge_in_pieces(one) if isinstance(one, Fitted) else [one], segments)
+        for outcome in (one for outcomes in judged for one in outcomes):
             found = self._new_or_known(outcome)
             if isinstance(found, Finding):
                 self.findings.append(found)
@@ -133,7 +153,7 @@ class Rounds:
             if self._removes:
                 # what the like of a rejected segment would lead to is known, too
                 closely = not isinstance(found, Finding)
-                self._game.withdraw(self._game.explained_by(found.segment, closely=closely))
+                self._withdraw(found.segment, closely=closely)
             log.advance()
 
     def _new_or_known(self, found: Finding | RejectedSegment) -> Finding | RejectedSegment:
@@ -232,6 +252,25 @@ class Rounds:
         found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
         return found if isinstance(found, Finding) and found.blend else None
 
+    def _judge_in_pieces(self, one: Fitted) -> list[Finding | RejectedSegment]:
+        """Verify a segment; where a whole has not the form of a cylinder, look for pieces of it that have."""
+        whole = self._judge(*one)
+        if isinstance(whole, Finding) or not is_long_and_uneven(whole):
+            return [whole]
+        pieces: list[Finding | RejectedSegment] = []
+        queue = halves(one.segment)
+        while queue:
+            piece = queue.pop(0)
+            fitted = refit(piece, self._indexed, most=20000)
+            if isinstance(fitted, str):
+                continue
+            found = self._judge(fitted, one.support, one.payoff)
+            if isinstance(found, Finding):
+                if found.measures["deviation_radii"]<=MOST_UNEVEN: pieces.append(found)
+            elif is_long_and_uneven(found):
+                queue += halves(piece)
+        return pieces or [whole]
+
     def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | RejectedSegment:
         """Verify a segment; what speaks most against it if it does not pass."""
         if reason := self._out_of_range(segment):
@@ -263,6 +302,20 @@ class Rounds:
     def _out_of_range(self, segment: Segment) -> str:
         return out_of_range(segment, self._prepared.radii, self._config.scene)
 
+
+def is_long_and_uneven(one):
+    m=one.measures
+    return bool(m) and one.reason in ("form","agreement","other shape","lack of fit","bend","bulge","slope","facets") and m["height_radii"]>=2*SHORTEST_PIECE and m["structure_radii"]>UNEVEN
+
+def halves(segment):
+    out=[]
+    for sign in (-.5,.5):
+        model=segment.model.copy(); model[:3]+=sign*segment.half*model[3:6]
+        out.append(replace(segment,model=model,half=.5*segment.half))
+    return out
+SHORTEST_PIECE=5.0
+UNEVEN=.02
+MOST_UNEVEN=.11
 
 def _finding(segment: Segment, verdict: Verdict, support: int, payoff: float) -> Finding:
     return Finding(

@@ -61,6 +61,7 @@ class CandidateGame:
         self._config = config
         self.candidates = candidates
         self._alive = np.ones(len(candidates), np.bool_)
+        self._restored = np.zeros(len(candidates), np.bool_)
         self._places = Neighbourhood(candidates)
         self._dropped = {"too small": 0, "too little payoff": 0}
         self._clusters = 0
@@ -126,6 +127,14 @@ class CandidateGame:
             self._alive[i] = False
             columns, values = self._payoff.row(i)
             self._degrees[columns] -= values
+
+    def restore(self, indices: IndexArray) -> None:
+        """Put candidates back into the game, each once: a cluster had them that was not theirs."""
+        for i in indices[~self._alive[indices] & ~self._restored[indices]]:
+            self._alive[i] = self._restored[i] = True
+            columns, values = self._payoff.row(i)
+            self._degrees[columns] += values
+            heapq.heappush(self._heap, (-float(self._degrees[i]), int(i)))
 
     def explained_by(self, segment: Segment, *, closely: bool = False) -> IndexArray:
         """Return the remaining candidates that a cylinder explains, or with `closely` those that nearly equal it."""

@@ -11,13 +11,16 @@ from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedul
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
+from cylx.stages.pieces import ends_before
 
 LEAST_COSINE_OF_PIECES = math.cos(math.radians(8.0))
 """Axes of two pieces of one pipe differ less; the rest is decided by a fit to both."""
 LEAST_COSINE_OF_THE_SAME, MOST_RADIUS_DIFFERENCE, MOST_OFFSET_OF_THE_SAME = math.cos(math.radians(4.0)), 0.1, 0.15
 """A segment that differs less from a known one, in direction, relative radius and offset in radii, is the same."""
-HALF = 7
-"""Where rows of segments have half the height."""
+LEAST_RADIUS_DIFFERENCE, DEVIATIONS_OF_THE_SAME = 0.03, 4.0
+"""The relative radius may always differ by this much, and else by so many deviations of the points of both."""
+HALF, SPREAD = 7, 8
+"""Where rows of segments have half the height and the spread."""
 LEAST_RADIUS_RATIO = 0.75
 """Radii of two pieces of one pipe differ less."""
 MOST_OFFSET_OF_PIECES, ERRORS_OF_OFFSET = 0.3, 4.0
@@ -106,21 +109,24 @@ def _first_join(pool: list[Finding], i: int, indexed: IndexedCloud, judge: Judge
 
 
 def as_rows(segments: Sequence[Segment]) -> FloatArray:
-    """Return segments as rows (n, 8): model and half height."""
-    return np.array([[*segment.model, segment.half] for segment in segments]).reshape(len(segments), 8)
+    """Return segments as rows (n, 9): model, half height and spread."""
+    return np.array([[*one.model, one.half, one.spread] for one in segments]).reshape(len(segments), 9)
 
 
 def is_part_of(segment: Segment, known: FloatArray) -> bool:
-    """Return whether a segment lies on a known one: axis within a sixth of the radius, radius within a tenth.
+    """Return whether a segment lies on a known one: axis within a sixth of the radius, radius within a tenth at most.
 
     Parameters
     ----------
     segment : Segment
-    known : ndarray of shape (n, 8)
+    known : ndarray of shape (n, 9)
         From `as_rows`.
     """
     alike = np.abs(known[:, DIRECTION] @ segment.direction) >= LEAST_COSINE_OF_THE_SAME
-    alike &= np.abs(segment.radius / known[:, RADIUS] - 1.0) <= MOST_RADIUS_DIFFERENCE
+    # walls whose points do not mix are two
+    mixed = DEVIATIONS_OF_THE_SAME * (segment.spread + known[:, SPREAD]) / known[:, RADIUS]
+    most = np.clip(mixed, LEAST_RADIUS_DIFFERENCE, MOST_RADIUS_DIFFERENCE)
+    alike &= np.abs(segment.radius / known[:, RADIUS] - 1.0) <= most
     known = known[alike]
     across = segment.point - known[:, POINT]
     heights = (across * known[:, DIRECTION]).sum(axis=1)
@@ -180,6 +186,8 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
     across = two.point - one.point
     height = float(across @ one.direction)
     gap, model = abs(height) - one.half - two.half, one.model.copy()
+    if ends_before(a, b, indexed, gap) and ends_before(b, a, indexed, gap):
+        return None
     far = gap > FAR_APART * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
     if far:
         if error > MOST_ERROR_OF_PIECES * one.radius or not _point_at_each_other(a, b):

@@ -110,7 +110,7 @@ def find_curved_patches(
 
     _in_parts(look, len(seeds), threads)
     kept = rows[outcome == 3]
-    found = Candidates.of_windows(kept[:, :9], kept[:, 9], kept_patches[outcome == 3, :3])
+    found = Candidates.of_windows(kept[:, :9], kept[:, 9], points[seeds[outcome == 3]])
     counts = np.bincount(outcome, minlength=4)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:3], counts[:3], strict=True) if n}
     return found, normals, StageReport("patches", len(seeds), len(kept), rejected)

@@ -130,7 +130,7 @@ def _measures_of(
     form = deviations_of_form(shell, deviation)
     structure = form["structure"]
     tangent, both = continuation(shell, radius)
-    inside, outside = emptiness(shell, radius)
+    inside, outside = emptiness(shell, radius, segment.half)
     consistent, near = counts
     along = math.copysign(1.0, segment.direction[np.abs(segment.direction).argmax()])  # as the result has it
     scatter = own_scatter(shell, radius, segment.half, coverage)

@@ -1,0 +1,70 @@
+"""Clusters -> clusters of one surface: walls about one axis that lie close together give candidates that agree.
+
+Candidates of noisy windows differ by a tenth of the radius, and so the game takes two walls whose radii differ by less
+for one. The windows themselves were laid on one of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.records import Candidates, Cluster, IndexedCloud, Segment
+
+WIDTH_NOISES, WIDTH_RADII = 5.0, 0.01
+"""A window within so many noises or radii of a cylinder, whichever is more, was laid on it."""
+MOST_TRIED = 12
+"""Candidates of most weight that are tried as the surface."""
+ENOUGH = 0.5
+"""An average that passes through this share of the windows is that of one surface."""
+LEAST_GAIN = 2.0
+"""A candidate takes its place if so many times more windows were laid on it."""
+LEAST_WINDOWS = 3
+"""Windows that make a surface."""
+
+
+def of_one_surface(
+    candidates: Candidates, cluster: Cluster, average: Segment, indexed: IndexedCloud
+) -> tuple[Cluster, IndexArray] | None:
+    """Split a cluster whose average lies between two surfaces.
+
+    Parameters
+    ----------
+    candidates : Candidates
+    cluster : Cluster
+    average : Segment
+        Of the cluster.
+    indexed : IndexedCloud
+
+    Returns
+    -------
+    one : Cluster
+        The members of the surface on which most windows were laid.
+    others : ndarray of int
+        The members that belong to other surfaces; None instead of both if the average is that of one.
+    """
+    places = candidates.places[cluster.members]
+    known = ~np.isnan(places[:, 0])
+    if known.sum() < 2 * LEAST_WINDOWS:
+        return None
+    width = max(WIDTH_NOISES * indexed.noise_about(average.model, average.half), WIDTH_RADII * average.radius)
+    on = known & is_on(places, average.model, width)
+    if on.sum() >= ENOUGH * known.sum():
+        return None
+    best, most = on, LEAST_GAIN * float(on.sum())
+    for i in cluster.members[np.argsort(-cluster.weights, kind="stable")[:MOST_TRIED]]:
+        own = known & is_on(places, candidates.models[i], width)
+        if own.sum() > most:
+            best, most = own, float(own.sum())
+    if best is on or best.sum() < LEAST_WINDOWS:
+        return None
+    weights = cluster.weights[best]
+    return Cluster(cluster.members[best], weights / weights.sum(), cluster.payoff), cluster.members[known & ~best]
+
+
+def is_on(places: FloatArray, model: FloatArray, width: float) -> MaskArray:
+    """Return which places lie within `width` of the surface of a cylinder, however far along it."""
+    away = places - model[:3]
+    heights = away @ model[3:6]
+    distances = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0))
+    return np.asarray(np.abs(distances - model[6]) < width, dtype=np.bool_)
