@@ -17,7 +17,7 @@ FAINT = 0.2
 """A piece with less than this share of the mean of the known part's pieces shows another, passing object."""
 FULL_PIECE = 12.0
 """Number of points that a piece of the height should hold."""
-LEAP = 4.0
+LEAP = 3.0
 """A gap is bridged if it is no longer than so many times what was filled before it: two discs on one axis are no pipe."""
 LONE = 6.0
 """An outermost point is a stray if the third point from the end lies further in by more than this many usual gaps; with

@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from cylx.game.agreement import Neighbourhood, is_contradicted
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
@@ -52,6 +52,7 @@ class Fitted(NamedTuple):
     segment: Segment
     support: int
     payoff: float
+    members: IndexArray = np.empty(0, np.int64)
 
 
 class Rounds:
@@ -138,11 +139,14 @@ class Rounds:
             return RejectedSegment(average, fitted, support, payoff)
         if self._removes and is_part_of(fitted, known):
             return RejectedSegment(fitted, FOUND_BEFORE, support, payoff)
-        return Fitted(fitted, support, payoff)
+        return Fitted(fitted, support, payoff, cluster.members)
 
     def verify(self, segments: list[Fitted | RejectedSegment], log: StageLog) -> None:
         """Judge the fitted segments, over threads; take what the accepted ones explain out of the game."""
         judged = self._over_threads(lambda one: self._judge_in_pieces(one) if isinstance(one, Fitted) else [one], segments)
+        if self._removes:
+            for one in segments:
+                self._restore_beyond(one) if isinstance(one, Fitted) else None
         for outcome in (one for outcomes in judged for one in outcomes):
             found = self._new_or_known(outcome)
             if isinstance(found, Finding):
@@ -155,6 +159,12 @@ class Rounds:
                 closely = not isinstance(found, Finding)
                 self._withdraw(found.segment, closely=closely)
             log.advance()
+
+    def _restore_beyond(self, one: Fitted) -> None:
+        """Put the members of a cluster back into the game that were laid beyond the ends of what it led to."""
+        places = self._game.candidates.places[one.members]
+        heights = (places - one.segment.point) @ one.segment.direction
+        self._game.restore(one.members[np.abs(heights) > one.segment.half + one.segment.radius])
 
     def _new_or_known(self, found: Finding | RejectedSegment) -> Finding | RejectedSegment:
         """Reject a finding that another cluster of the same round has led to before."""
@@ -254,7 +264,7 @@ class Rounds:
 
     def _judge_in_pieces(self, one: Fitted) -> list[Finding | RejectedSegment]:
         """Verify a segment; where a whole has not the form of a cylinder, look for pieces of it that have."""
-        whole = self._judge(*one)
+        whole = self._judge(one.segment, one.support, one.payoff)
         if isinstance(whole, Finding) or not is_long_and_uneven(whole):
             return [whole]
         pieces: list[Finding | RejectedSegment] = []

@@ -16,6 +16,7 @@ from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.coverage import sector_of
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
+from cylx.stages.pieces import ends_in_cut
 from cylx.records import Finding, IndexedCloud, Segment
 
 Judge = Callable[[Segment, Finding], Finding | None]
@@ -86,6 +87,10 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
     near = indexed.cells.near_cylinder(model, -reach, reach, 0.0, outer)
     near = near[indexed.may_be_on(near, model)]
     heights, residuals, _ = coordinates_of(indexed.points, near, model)
+    beyond = ((heights < -half) & ends_in_cut(finding, indexed, False)) | (
+        (heights > half) & ends_in_cut(finding, indexed, True)
+    )
+    near, heights, residuals = near[~beyond], heights[~beyond], residuals[~beyond]
     astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
     fresh = (np.abs(heights) > half) & (np.abs(residuals) < 3.0 * noise + 2.0 * astray)
     if fresh.sum() < LEAST_POINTS_BEYOND_END:

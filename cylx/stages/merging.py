@@ -11,7 +11,7 @@ from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedul
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
-from cylx.stages.pieces import ends_before
+from cylx.stages.pieces import are_distinct
 
 LEAST_COSINE_OF_PIECES = math.cos(math.radians(8.0))
 """Axes of two pieces of one pipe differ less; the rest is decided by a fit to both."""
@@ -186,7 +186,7 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
     across = two.point - one.point
     height = float(across @ one.direction)
     gap, model = abs(height) - one.half - two.half, one.model.copy()
-    if ends_before(a, b, indexed, gap) and ends_before(b, a, indexed, gap):
+    if are_distinct(a, b, indexed, gap):
         return None
     far = gap > FAR_APART * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
     if far:

@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 
-from cylx.geometry.coverage import SECTORS, sector_of
 from cylx.geometry.cylinder import coordinates_of
 from cylx.records import Finding, IndexedCloud
 
 LEAST_COVERAGE = math.radians(300.0)
 """What hides the middle of a pipe hides it from one side. Of a piece seen all round nothing is hidden at its end."""
+SECTORS = 12
+"""Sectors of the turn of which each has an end."""
 CLEAN_SHARE = 0.85
 """Share of the sectors that must end at one height for the end to be a cut across the axis."""
 GAPS_OF_POINTS, ALLOWED_RADII = 3.0, 0.05
@@ -20,27 +21,45 @@ TELLING_SHARE = 0.6
 """If this is more than this share of the height, points are too few to tell."""
 
 
-def ends_before(finding: Finding, other: Finding, indexed: IndexedCloud, gap: float) -> bool:
-    """Return whether a piece ends in a cut across its axis, all round, on the side of another piece of its axis.
+def are_distinct(one: Finding, other: Finding, indexed: IndexedCloud, gap: float) -> bool:
+    """Return whether two pieces of one axis both end in a cut across it, on either side of a gap.
 
     Parameters
     ----------
-    finding, other : Finding
+    one, other : Finding
     indexed : IndexedCloud
     gap : float
         Between the two, along the axis; frame units.
     """
+    across = other.segment.point - one.segment.point
+    return all(
+        ends_in_cut(piece, indexed, bool(sign * (across @ piece.segment.direction) > 0.0), 0.5 * gap)
+        for piece, sign in ((one, 1.0), (other, -1.0))
+    )
+
+
+def ends_in_cut(finding: Finding, indexed: IndexedCloud, upper: bool, most: float = math.inf) -> bool:
+    """Return whether a piece ends in a cut across its axis, all round.
+
+    Parameters
+    ----------
+    finding : Finding
+    indexed : IndexedCloud
+    upper : bool
+        Whether to look at the end the direction points to, or at the other.
+    most : float
+        The end must be told within this length, frame units.
+    """
     segment = finding.segment
-    if finding.coverage < LEAST_COVERAGE or gap <= 0.0:
+    if finding.coverage < LEAST_COVERAGE:
         return False
     heights, _, angles = coordinates_of(indexed.points, finding.points, segment.model)
-    if (other.segment.point - segment.point) @ segment.direction < 0.0:
-        heights = -heights
-    sectors = sector_of(angles)
+    heights = heights if upper else -heights
+    sectors = ((angles / (2.0 * math.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
     counts = np.bincount(sectors, minlength=SECTORS)
     full = counts > 0
     allowed = GAPS_OF_POINTS * 2.0 * segment.half / float(np.median(counts[full])) + ALLOWED_RADII * segment.radius
-    if allowed > TELLING_SHARE * 2.0 * segment.half or gap < 2.0 * allowed:
+    if allowed > min(TELLING_SHARE * 2.0 * segment.half, most):
         return False
     ends = np.full(SECTORS, -np.inf)
     np.maximum.at(ends, sectors, heights)
