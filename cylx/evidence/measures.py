@@ -97,8 +97,18 @@ def look_at(segment: Segment, indexed: IndexedCloud) -> Shell:
     )
     heights, residuals, angles = coordinates_of(indexed.points, near, model)
     flat = ~indexed.may_be_on(near, model, segment.flat_share)
+    if segment.wedge is not None:
+        flat |= _beyond_wedge(indexed.points[near], segment)
     on = (np.abs(residuals) < 3.0 * deviation) & ~flat
     return Shell(near, heights / max(half, 1e-300), residuals, angles, on, flat, deviation)
+
+
+def _beyond_wedge(points: FloatArray, segment: Segment) -> MaskArray:
+    """Return which points lie beyond the ends of an arc."""
+    assert segment.wedge is not None
+    away = points - segment.point
+    away -= np.outer(away @ segment.direction, segment.direction)
+    return np.asarray(away @ segment.wedge[:3] < segment.wedge[3] * np.linalg.norm(away, axis=1), dtype=np.bool_)
 
 
 def distinct_places(angles: FloatArray, radius: float, deviation: float) -> float:

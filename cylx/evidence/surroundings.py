@@ -24,6 +24,8 @@ ARC_SHARE = 0.3
 """Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
 
 
+OUTER_SECTORS, CLEAR_WALL = 20, 0.15
+"""An outer wall goes over so many sectors, and is told from what lies about a surface only if that is no rougher."""
 LEAST_OF_MEAN = 0.5
 """Pieces of the height count as if they held this share of what they hold on the average."""
 END, END_DEVIATIONS, MOST_END = 0.02, 4.0, 0.4
@@ -44,7 +46,8 @@ def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     inside = (shell.residuals < -4.0 * shell.deviation) & (shell.residuals > -beside)
     outside = (shell.residuals > 4.0 * shell.deviation) & (shell.residuals < outer) & ~shell.flat
     inside &= ~_on_other_wall(shell, inside, radius)
-    outside &= ~_on_other_wall(shell, outside, radius)
+    if 6.0 * shell.deviation < CLEAR_WALL * radius:  # the wall of a rough surface could be anything
+        outside &= ~_on_other_wall(shell, outside, radius, OUTER_SECTORS)
     counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT + 1) for mask in (on, inside, outside)]
     if counts[0][:-1].any():  # caps and plates lie at the ends
         counts = [count[:-1] for count in counts]
@@ -61,7 +64,7 @@ def _end_of(shell: Shell, half: float) -> float:
     return min(END + END_DEVIATIONS * shell.deviation / max(half, 1e-300), MOST_END)
 
 
-def _on_other_wall(shell: Shell, aside: MaskArray, radius: float) -> MaskArray:
+def _on_other_wall(shell: Shell, aside: MaskArray, radius: float, sectors: int = WALL_SECTORS) -> MaskArray:
     """Return which of the points inside or outside lie on a cylinder about the same axis: other wall of tube or mug."""
     where = np.flatnonzero(aside)
     none = np.zeros(len(aside), np.bool_)
@@ -74,7 +77,7 @@ def _on_other_wall(shell: Shell, aside: MaskArray, radius: float) -> MaskArray:
     )
     first = int(counts.argmax())
     wall = where[first : first + int(counts[first])]
-    if len(wall) < WALL_SHARE * len(where) or len(np.unique(sector_of(shell.angles[wall]))) < WALL_SECTORS:
+    if len(wall) < WALL_SHARE * len(where) or len(np.unique(sector_of(shell.angles[wall]))) < sectors:
         return none
     none[wall] = True
     return none

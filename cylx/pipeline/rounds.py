@@ -17,7 +17,8 @@ from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
 from cylx.stages.consensus import is_on, of_one_surface
-from cylx.stages.averaging import average_cluster, finish, inflation, narrow_to_arc, refine, refit
+from cylx.stages.arcs import narrow_to_arc
+from cylx.stages.averaging import average_cluster, finish, inflation, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.extending import extend
 from cylx.stages.measuring import measure_extent
@@ -239,7 +240,11 @@ class Rounds:
         fitted = finish(
             finding.segment, self._indexed, self._prepared.known, self._prepared.catalogue, inflated=inflated
         )
-        return finding if isinstance(fitted, str) else replace(finding, segment=fitted)
+        if isinstance(fitted, str):
+            return finding
+        if finding.segment.wedge is not None:  # fitted with what it touches
+            fitted = replace(finding.segment, covariance=fitted.covariance)
+        return replace(finding, segment=fitted)
 
     def _enough(self) -> bool:
         """Return whether to stop early: the paper's order is that of the clusters, ours that of the cylinders."""

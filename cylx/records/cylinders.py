@@ -42,6 +42,9 @@ class Segment:
     flat_share : float
         Share of the flatness that makes points those of something flatter, from which they are left out here: less
         than 1 for an arc that goes on into planes.
+    wedge : ndarray of shape (4,), optional
+        Unit direction from the axis to the middle of an arc, and the cosine of half its angle: what lies beyond is of
+        the planes that touch it. None for whatever is no such arc.
     """
 
     model: FloatArray
@@ -50,6 +53,7 @@ class Segment:
     covariance: FloatArray | None = None
     choice: Choice | None = None
     flat_share: float = 1.0
+    wedge: FloatArray | None = None
 
     @property
     def point(self) -> FloatArray:

@@ -73,8 +73,6 @@ WIDEST_IN_LAST_FIT = 8.0
 """Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
 MOST_FORM, MOST_FORM_NOISES = 0.04, 6.0
 """Scatter that a surface may have beyond that, as a share of the radius, and in noises."""
-ARC_FLAT, ARC_STEPS = 0.2, 4
-"""Points of flat windows of this share of what is too flat are not of an arc, and so many fits settle it."""
 LEAST_COSINE = math.cos(math.radians(25.0))
 """A fit whose axis turns further than this has left the candidates it came from."""
 
@@ -215,30 +213,6 @@ def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> S
     model, spread = fit
     model[RADIUS] = unbiased_radius(model[RADIUS], min(spread, 0.5 * model[RADIUS]))
     return replace(segment, model=model, spread=spread, covariance=None, choice=None)
-
-
-def narrow_to_arc(segment: Segment, indexed: IndexedCloud) -> Segment | str:
-    """Fit a cylinder again without the points of the planes that it goes on into.
-
-    An arc between two planes that touch it takes some of their points within the noise, and its radius comes out too
-    large.
-
-    Parameters
-    ----------
-    segment : Segment
-    indexed : IndexedCloud
-
-    Returns
-    -------
-    Segment or str
-        The arc, or why there is none.
-    """
-    narrowed: Segment | str = replace(segment, flat_share=ARC_FLAT)
-    for _ in range(ARC_STEPS):
-        if isinstance(narrowed, str):
-            break
-        narrowed = refit(narrowed, indexed, most=ENOUGH_TO_JUDGE)
-    return narrowed
 
 
 def inflation(measures: Mapping[str, float]) -> float:

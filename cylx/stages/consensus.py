@@ -19,6 +19,9 @@ ENOUGH = 0.5
 """An average that passes through this share of the windows is that of one surface."""
 LEAST_GAIN = 2.0
 """A candidate takes its place if so many times more windows were laid on it."""
+WIDER, MOST_BESIDE = 3.0, 0.2
+"""The windows of two walls lie on one or the other; those of a rough surface lie up to so many times further off, too,
+and then they are more than this share."""
 LEAST_WINDOWS = 3
 """Windows that make a surface."""
 
@@ -54,7 +57,8 @@ def of_one_surface(
     best, most = on, LEAST_GAIN * float(on.sum())
     for i in cluster.members[np.argsort(-cluster.weights, kind="stable")[:MOST_TRIED]]:
         own = known & is_on(places, candidates.models[i], width)
-        if own.sum() > most:
+        beside = known & is_on(places, candidates.models[i], WIDER * width) & ~own
+        if own.sum() > most and beside.sum() <= MOST_BESIDE * own.sum():
             best, most = own, float(own.sum())
     if best is on or best.sum() < LEAST_WINDOWS:
         return None

@@ -1,0 +1,88 @@
+"""Arcs that go on tangentially: fitted with the planes that they go on into, or without the points of these."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from cylx.fits.profile import fit_profile
+from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import RADIUS, coordinates_of
+from cylx.geometry.numerics import fill_basis
+from cylx.records import IndexedCloud, Segment
+from cylx.stages.averaging import ENOUGH_TO_JUDGE, refit
+
+ARC_FLAT, ARC_STEPS = 0.2, 4
+"""Points of flat windows of this share of what is too flat are not of an arc, and so many fits settle it."""
+REACH = 2.5
+"""The profile is fitted to what lies within so many radii of the axis."""
+ENOUGH_OF_PROFILE = 4000
+"""Points of it that suffice."""
+LEAST_DEVIATION = 0.004
+"""Deviation of the points about a profile, in radii, at least."""
+LEAST_GAIN = 12.0
+"""A profile replaces the fit if its squared residuals are smaller by so many squared deviations."""
+MOST_CHI_SQUARE = 2.0
+"""Mean square, in squared deviations and clipped at nine, of the residuals of its points."""
+
+
+def narrow_to_arc(segment: Segment, indexed: IndexedCloud) -> Segment | str:
+    """Fit a cylinder again as an arc between planes that touch it.
+
+    An arc between two planes takes some of their points within the noise, and its radius comes out too large. Where
+    both planes are seen, all three are fitted as one; else what lies in flat windows is left out.
+
+    Parameters
+    ----------
+    segment : Segment
+    indexed : IndexedCloud
+
+    Returns
+    -------
+    Segment or str
+        The arc, or why there is none.
+    """
+    narrowed: Segment | str = replace(segment, flat_share=ARC_FLAT)
+    for _ in range(ARC_STEPS):
+        if isinstance(narrowed, str):
+            break
+        narrowed = refit(narrowed, indexed, most=ENOUGH_TO_JUDGE)
+    for start in (segment, narrowed):
+        profiled = None if isinstance(start, str) else _with_profile(start, indexed)
+        if profiled is not None:
+            return profiled
+    return narrowed
+
+
+def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
+    """Fit an arc and the planes that touch it as one; None if these are not there."""
+    model, half, radius = segment.model, segment.half, segment.radius
+    deviation = max(indexed.noise_about(model, half), LEAST_DEVIATION * radius)
+    near = indexed.cells.near_cylinder(model, -half, half, 0.0, REACH * radius)
+    near = near[:: 1 + len(near) // ENOUGH_OF_PROFILE]
+    if len(near) == 0:
+        return None
+    _, residuals, angles = coordinates_of(indexed.points, near, model)
+    on = np.abs(residuals) < 3.0 * deviation
+    if not on.any():
+        return None
+    middle = math.atan2(float(np.sin(angles[on]).mean()), float(np.cos(angles[on]).mean()))
+    distances = residuals + radius
+    flat = np.column_stack([distances * np.cos(angles), distances * np.sin(angles)])
+    profile = fit_profile(flat, radius, middle, deviation)
+    if profile is None or profile.gain < LEAST_GAIN or profile.edge_gain < LEAST_GAIN:
+        return None
+    if profile.chi_square > MOST_CHI_SQUARE:
+        return None
+    basis = np.empty((2, 3))
+    fill_basis(segment.direction, basis)
+    moved = model.copy()
+    moved[:3] += profile.center @ basis
+    moved[RADIUS] = profile.radius
+    return replace(segment, model=moved, spread=deviation, flat_share=1.0, wedge=_wedge(basis, profile.middle, profile.opening))
+
+
+def _wedge(basis: FloatArray, middle: float, opening: float) -> FloatArray:
+    return np.array([*(math.cos(middle) * basis[0] + math.sin(middle) * basis[1]), math.cos(opening)])
