@@ -10,6 +10,7 @@ from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, coordinates_of
+from cylx.geometry.numerics import fill_basis
 from cylx.records import IndexedCloud, Segment
 
 TRUNCATED = 0.9866
@@ -109,6 +110,35 @@ def _beyond_wedge(points: FloatArray, segment: Segment) -> MaskArray:
     away = points - segment.point
     away -= np.outer(away @ segment.direction, segment.direction)
     return np.asarray(away @ segment.wedge[:3] < segment.wedge[3] * np.linalg.norm(away, axis=1), dtype=np.bool_)
+
+
+def edge_gain(shell: Shell, segment: Segment, deviation: float) -> float:
+    """Return how much better an arc explains its points than the sharp edge of the planes that touch it.
+
+    Parameters
+    ----------
+    shell : Shell
+    segment : Segment
+    deviation : float
+        Of the points about the arc, frame units.
+
+    Returns
+    -------
+    float
+        Difference of the sums of squares, in squared deviations, each square at most nine; 0 if it is no such arc.
+    """
+    if segment.wedge is None:
+        return 0.0
+    basis = np.empty((2, 3))
+    fill_basis(segment.direction, basis)
+    middle = math.atan2(float(segment.wedge[:3] @ basis[1]), float(segment.wedge[:3] @ basis[0]))
+    opening = math.acos(min(1.0, max(-1.0, float(segment.wedge[3]))))
+    near = (np.abs(shell.residuals) < 0.5 * segment.radius) & ~shell.flat
+    turn = np.abs((shell.angles[near] - middle + math.pi) % (2.0 * math.pi) - math.pi)
+    distances = shell.residuals[near] + segment.radius
+    heights = distances * np.cos(opening - turn) - segment.radius  # over the nearer of the two planes
+    squares = [np.minimum(np.abs(one) / deviation, 3.0) ** 2 for one in (heights, shell.residuals[near])]
+    return float((squares[0] - squares[1]).sum())
 
 
 def distinct_places(angles: FloatArray, radius: float, deviation: float) -> float:

@@ -87,7 +87,7 @@ def _find_ends(
     for i in range(len(heights)):
         if arc[_bin(angles[i])]:
             lowest, highest = min(lowest, heights[i]), max(highest, heights[i])
-    piece = max(0.25 * radius, FULL_PIECE / density)
+    piece = max(0.25 * min(radius, 2.0 * half), FULL_PIECE / density)  # of a disc, a quarter of its height
     first = math.floor(lowest / piece)
     pieces = int(math.floor(highest / piece) - first) + 1
     asked = np.ones(pieces)

@@ -47,8 +47,8 @@ MOST_RADIUS_RATIO = 2.0
 """A fit whose radius changes more than this has left the candidates it came from."""
 LEAST_POINTS_OF_AVERAGE = 20
 """Without so many points five parameters are not fitted robustly."""
-SHORTEST_HALF = 0.02
-"""A cylinder has at least this half height, in radii: what is shorter is a circle."""
+SHORTEST_HALF, SHORTEST_SPACINGS = 0.02, 0.5
+"""A cylinder has at least this half height, in radii or in spacings: what is shorter is a circle."""
 SETTLED = 0.01
 """Growth ends when half the height changes less than this share of itself and of the radius."""
 SHELL_OF_FIT, LEAST_SHELL_OF_FIT = 4.0, 0.02
@@ -165,7 +165,7 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
         before = half
         half = 0.5 * (high - low)
         model[POINT] += 0.5 * (low + high) * model[DIRECTION]
-        if half < SHORTEST_HALF * model[RADIUS]:
+        if half < min(SHORTEST_HALF * model[RADIUS], SHORTEST_SPACINGS):
             return "too short"
         if step and abs(half - before) < SETTLED * before + SETTLED * model[RADIUS]:
             break

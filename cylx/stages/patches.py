@@ -21,6 +21,7 @@ from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.patches import SIZE, TERMS, choose_patches, find_planar, fit_patches, osculating_of
 from cylx.records import Candidates, Explained, Frame, StageReport
+from cylx.stages.rims import directions_of, find_rims, normals_of_planes
 
 MOST_NOISE = 0.28
 """Noise in spacings up to which patches of sixteen points show the curvature of a surface."""
@@ -95,6 +96,11 @@ def find_curved_patches(
     sharp = (owners >= 0) & (patches[owners, 13] < np.maximum(3.0 * noise, SHARP * patches[owners, 14]))
     own[~sharp] = 0.0
     normals[rest] = own
+    edges = which[planar & ~planes.any(axis=1)]  # what lies within a plane is no wall
+    rims, _ = find_rims(
+        np.concatenate([points, frame.points[edges]]), np.concatenate([normals[rest], normals[edges]]),
+        directions_of(np.concatenate([normals_of_planes(frame.points, cells, starts, side, explained.flatness), planes[planar].astype(np.float64)])), noise, radius_range, threads,
+    )  # fmt: skip
     seeds = np.unique(owners[sharp])
     seeds = seeds[:: 1 + len(seeds) // MOST_SEEDS]
     kept_patches = patches[seeds]
@@ -113,7 +119,7 @@ def find_curved_patches(
     found = Candidates.of_windows(kept[:, :9], kept[:, 9], points[seeds[outcome == 3]])
     counts = np.bincount(outcome, minlength=4)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:3], counts[:3], strict=True) if n}
-    return found, normals, StageReport("patches", len(seeds), len(kept), rejected)
+    return Candidates.joined([found, rims]), normals, StageReport("patches", len(seeds), len(kept) + len(rims), rejected)
 
 
 def _in_parts(work: Callable[[slice], None], count: int, threads: int) -> None:
