@@ -58,7 +58,7 @@ def extract_cylinders(
     with log.stage("curvature"):
         windows, explained = windows_and_explained(prepared, log)
     with log.stage("patches"):
-        patches, normals = candidates_of_patches(prepared, explained, log)
+        patches, rims, normals = candidates_of_patches(prepared, explained, log)
         indexed = IndexedCloud.of(prepared.frame, explained.flatness, normals)
     with log.stage("slicing"):
         slices = cut_slices(prepared, explained.flatness, log)
@@ -67,7 +67,7 @@ def extract_cylinders(
     with log.stage("candidates"):
         of_slices = candidates_of_slices(prepared, ellipses, log)
         local = candidates_of_windows(prepared, explained, log)
-        found = Candidates.joined([windows, patches, of_slices, local])
+        found = Candidates.joined([windows, patches, rims, of_slices, local])
         all_windows = Candidates.joined([windows, patches, local]) if len(windows) or len(patches) else found
         candidates = select_candidates(prepared, found, log)
     with log.stage("clustering"):

@@ -44,14 +44,16 @@ def windows_and_explained(prepared: Prepared, log: StageLog) -> tuple[Candidates
 
 def candidates_of_patches(
     prepared: Prepared, explained: Explained, log: StageLog
-) -> tuple[Candidates, NDArray[np.float32] | None]:
-    """Propose candidates from the nearest points of each point; also return the normals, if the noise shows them."""
+) -> tuple[Candidates, Candidates, NDArray[np.float32] | None]:
+    """Propose candidates from the nearest points of each point, and from circles about the normals of planes; also return the normals, if the noise shows them."""
     frame, config = prepared.frame, prepared.config
     if "curvature" not in config.candidates.sources:
-        return Candidates.joined([]), None
-    found, normals, report = find_curved_patches(frame, explained, prepared.radii, config.candidates, prepared.threads)
+        return Candidates.joined([]), Candidates.joined([]), None
+    found, rims, normals, report = find_curved_patches(
+        frame, explained, prepared.radii, config.candidates, prepared.threads
+    )
     log.reports.append(report)
-    return found, normals
+    return found, rims, normals
 
 
 def cut_slices(prepared: Prepared, flatness: FloatArray, log: StageLog) -> list[Slice | None]:

@@ -35,8 +35,8 @@ FIRST_REACH, REACH_RADII, REACH_HALVES = 0.5, 1.5, 0.7
 is more, so that a long pipe grows as fast as a short one."""
 FIRST_SHELL, LATER_SHELL, LEAST_SHELL = 0.12, 0.05, 5.0
 """Half width of the shell in which points have a say: in radii at first, in radii later, and at least in noises."""
-NARROW_SHELL, NARROW_TIMES = 0.01, 4.0
-"""Half width in radii of a narrow shell, which is enough where points are so many times denser in it than about it."""
+NARROW_SHELLS, NARROW_TIMES = (0.002, 0.01), 4.0
+"""Half widths in radii of narrow shells, which are enough where points are so many times denser in them than about."""
 SHELL_MARGIN = 8.0
 """Points are gathered this many noises beyond the shell: it moves with the fit."""
 LEAST_WIDTH = 3.0
@@ -177,17 +177,18 @@ def _narrowed(points: FloatArray, model: FloatArray, half: float, shell: float, 
 
     Other surfaces about the same axis lie in the wide one as well: the wall of a tube, steps of a shaft.
     """
-    narrow = max(NARROW_SHELL * model[RADIUS], LEAST_SHELL * noise)
-    if narrow >= shell:
-        return shell
     away = points - model[POINT]
     heights = away @ model[DIRECTION]
     distances = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0))
     residuals = np.abs(distances - model[RADIUS])[np.abs(heights) <= half]
-    within = int((residuals < narrow).sum())
-    around = int((residuals < shell).sum()) - within
-    dense = within * (shell - narrow) > NARROW_TIMES * around * narrow
-    return narrow if within >= LEAST_POINTS_OF_AVERAGE and dense else shell
+    all_around = int((residuals < shell).sum())
+    for share in NARROW_SHELLS:
+        narrow = max(share * model[RADIUS], LEAST_SHELL * noise)
+        within = int((residuals < narrow).sum())
+        dense = within * (shell - narrow) > NARROW_TIMES * (all_around - within) * narrow
+        if narrow < shell and within >= LEAST_POINTS_OF_AVERAGE and dense:
+            return narrow
+    return shell
 
 
 def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> Segment | str:

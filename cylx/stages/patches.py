@@ -51,12 +51,15 @@ OUTCOMES = ("no curvature", "does not fit", "badly supported", "kept")
 
 def find_curved_patches(
     frame: Frame, explained: Explained, radius_range: tuple[float, float], config: CandidatesConfig, threads: int
-) -> tuple[Candidates, NDArray[np.float32] | None, StageReport]:
+) -> tuple[Candidates, Candidates, NDArray[np.float32] | None, StageReport]:
     """Propose a cylinder for each patch of nearest points that is curved one way.
 
     Returns
     -------
     candidates : Candidates
+        Of patches, which are drawn evenly over the surface.
+    rims : Candidates
+        Of circles, as `find_rims` says.
     normals : ndarray of shape (N, 3), float32, or None
         Unit normals, either way; zero where the patches do not tell. None if the noise hides them everywhere.
     report : StageReport
@@ -66,7 +69,7 @@ def find_curved_patches(
     which = np.flatnonzero(explained.flatness <= (2.01 * frame.window if peeled else 0.0))
     which = which[:: 1 + len(which) // MOST_PATCHES]
     if noise > MOST_NOISE or len(which) < SIZE:
-        return Candidates.joined([]), None, StageReport("patches", 0, 0, {})
+        return Candidates.joined([]), Candidates.joined([]), None, StageReport("patches", 0, 0, {})
     normals = np.zeros((len(frame.points), 3), np.float32)
     level = max(0, round(math.log2(REACH[0] / frame.unit)))
     side = frame.unit * 2.0**level
@@ -82,7 +85,7 @@ def find_curved_patches(
     # what lies on no plane is looked at by itself, so that no patch of it crosses an edge
     rest = which[~planar]
     if len(rest) < SIZE:
-        return Candidates.joined([]), normals, StageReport("patches", 0, 0, {})
+        return Candidates.joined([]), Candidates.joined([]), normals, StageReport("patches", 0, 0, {})
     points, every = np.ascontiguousarray(frame.points[rest]), np.arange(len(rest))
     own_cells, own_starts = cell_starts(frame.codes[rest], level)
     patches, members = np.empty((len(rest), TERMS)), np.empty((len(rest), SIZE), np.int64)
@@ -119,7 +122,7 @@ def find_curved_patches(
     found = Candidates.of_windows(kept[:, :9], kept[:, 9], points[seeds[outcome == 3]])
     counts = np.bincount(outcome, minlength=4)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:3], counts[:3], strict=True) if n}
-    return Candidates.joined([found, rims]), normals, StageReport("patches", len(seeds), len(kept) + len(rims), rejected)
+    return found, rims, normals, StageReport("patches", len(seeds), len(kept) + len(rims), rejected)
 
 
 def _in_parts(work: Callable[[slice], None], count: int, threads: int) -> None:
