@@ -52,6 +52,8 @@ class Term(NamedTuple):
 
 FORM = 0.012
 """Real objects deviate from a cylinder by about this share of their radius: cans have seams, pipes are out of round."""
+SEEN = 0.005
+"""Move of the ends, in radii, that counts in full."""
 FORM_SCATTER = 1.2
 """No deviation of form beyond this many times the scatter is excused: that of a large radius could hide anything."""
 TELLING = 600.0
@@ -128,6 +130,20 @@ def _bend(measures: Mapping[str, float]) -> float:
     return min(max(0.0, measures["bend"] - excused), 0.2)
 
 
+def _one_shape(measures: Mapping[str, float]) -> float:
+    """Return the share of the scatter that one bend, slope or bulge explains, beyond a quarter.
+
+    The scatter of real things has many causes; where one of these makes most of it, the thing is an elbow, a cone or a
+    barrel, however little of it is seen. What moves the surface by less than `SEEN` does not count in full.
+    """
+    height, best = _height(measures), 0.0
+    for name, moves in (("bend", height**2 / 8.0), ("slope", height / 2.0), ("bulge", height**2 / 8.0)):
+        square = (measures[name] / max(measures[name + "_error"], 1e-12)) ** 2
+        share = square / (square + measures["inliers"])
+        best = max(best, share * min(1.0, abs(measures[name]) * moves / SEEN))
+    return max(0.0, best - 0.25)
+
+
 def _height(measures: Mapping[str, float]) -> float:
     return max(measures["height_radii"], 0.05)
 
@@ -155,6 +171,7 @@ TERMS = (
     Term("slope", -25.0, 0.00, _slope),
     Term("bulge", -13.162, 0.01, _bulge),
     Term("bend", -22.869, 0.00, _bend),
+    Term("other shape", -25.0, 0.00, _one_shape),
 )
 
 BLEND_BIAS = -12.702
@@ -169,6 +186,33 @@ BLEND_TERMS = (
     Term("agreement", 4.778, 0.40, lambda m: _log(m["agreement"] / 0.5, 0.1, 1.5)),
     Term("bend", -9.540, 0.00, _bend),
 )
+
+
+PROFILE_BIAS = -6.978
+PROFILE_TERMS = (
+    Term("form", -1.730, 0.00, lambda m: _log(m["structure_radii"] / 0.01, 1.0, 10.0)),
+    Term("oval", -116.8, 0.00, lambda m: min(m["ovality"], 0.05)),
+    Term("edge", 0.583, 1.59, lambda m: _log(m["edge_gain"] / max(m["inliers"], 20.0), 0.02, 5.0)),
+    Term("tangent", 2.830, 0.88, lambda m: min(m["tangent_both"], 1.0)),
+    Term("few points", 0.803, 0.71, lambda m: _log(m["inliers"] / 100.0, 0.2, 3.0)),
+    Term("curvature", 1.788, 1.33, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
+    Term("payoff", 5.460, 0.79, lambda m: m["payoff"]),
+    Term("bend", -22.08, 0.00, lambda m: min(m["bend"], 0.2)),
+)
+
+
+def weigh_profile(measures: Mapping[str, float]) -> float:
+    """Return the probability that an arc which was fitted with the two planes that touch it is a piece of a cylinder.
+
+    Candidates of windows that see the planes, too, are too large; so it is not asked whether they agree.
+
+    Parameters
+    ----------
+    measures : mapping of str to float
+        As for `weigh`.
+    """
+    odds = PROFILE_BIAS + sum(term.weight * term.value(measures) for term in PROFILE_TERMS)
+    return 1.0 / (1.0 + math.exp(-min(max(odds, -50.0), 50.0)))
 
 
 def weigh_blend(measures: Mapping[str, float]) -> float:
@@ -203,7 +247,7 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     >>> pipe = dict(lack_of_fit=1.0, structure_radii=0.0, explained=0.0, inside=0.0, outside=0.0, tangent=0.0,
     ...             flank=0.0, coverage=6.0, facets=0.0, prism=0.0, roughness=1.0, inliers=2000.0, curvature=500.0,
     ...             height_radii=9.0, payoff=0.8, agreement=0.95, scatter_radii=0.01, slope=0.0, slope_error=0.001,
-    ...             bulge=0.0, bend=0.0, bend_error=0.001, places=12.0)
+    ...             bulge=0.0, bulge_error=0.01, bend=0.0, bend_error=0.001, places=12.0)
     >>> weigh(pipe)[0] > 0.99
     True
     >>> confidence, worst = weigh({**pipe, "agreement": 0.1, "payoff": 0.3})

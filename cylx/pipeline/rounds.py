@@ -17,7 +17,7 @@ from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
 from cylx.stages.consensus import is_on, of_one_surface
-from cylx.stages.arcs import narrow_to_arc
+from cylx.stages.arcs import arcs_of
 from cylx.stages.averaging import average_cluster, finish, inflation, refine, refit
 from cylx.stages.clustering import CandidateGame
 from cylx.stages.extending import extend
@@ -306,13 +306,14 @@ class Rounds:
 
     def _judge_arc(self, segment: Segment, support: int, payoff: float) -> Finding | None:
         """Verify a segment as an arc that goes on tangentially; None if it is none."""
-        arc = narrow_to_arc(segment, self._indexed)
-        if isinstance(arc, str) or self._out_of_range(arc):
-            return None
-        counts = self._all_windows.agreement(arc)
-        verdict = verify(arc, self._indexed, payoff, counts, self._config.verification, arc=True)
-        accepted = not verdict.reason and may_be_arc(verdict)
-        return _finding(arc, verdict, support, payoff) if accepted else None
+        for arc in arcs_of(segment, self._indexed):
+            if self._out_of_range(arc):
+                continue
+            counts = self._all_windows.agreement(arc)
+            verdict = verify(arc, self._indexed, payoff, counts, self._config.verification, arc=True)
+            if not verdict.reason and may_be_arc(verdict):
+                return _finding(arc, verdict, support, payoff)
+        return None
 
     def _out_of_range(self, segment: Segment) -> str:
         return out_of_range(segment, self._prepared.radii, self._config.scene)

@@ -28,7 +28,7 @@ MOST_CHI_SQUARE = 2.0
 """Mean square, in squared deviations and clipped at nine, of the residuals of its points."""
 
 
-def narrow_to_arc(segment: Segment, indexed: IndexedCloud) -> Segment | str:
+def arcs_of(segment: Segment, indexed: IndexedCloud) -> list[Segment]:
     """Fit a cylinder again as an arc between planes that touch it.
 
     An arc between two planes takes some of their points within the noise, and its radius comes out too large. Where
@@ -41,19 +41,17 @@ def narrow_to_arc(segment: Segment, indexed: IndexedCloud) -> Segment | str:
 
     Returns
     -------
-    Segment or str
-        The arc, or why there is none.
+    list of Segment
+        The arc with its planes and the arc without them, as far as they are there; the more certain one first.
     """
     narrowed: Segment | str = replace(segment, flat_share=ARC_FLAT)
     for _ in range(ARC_STEPS):
         if isinstance(narrowed, str):
             break
         narrowed = refit(narrowed, indexed, most=ENOUGH_TO_JUDGE)
-    for start in (segment, narrowed):
-        profiled = None if isinstance(start, str) else _with_profile(start, indexed)
-        if profiled is not None:
-            return profiled
-    return narrowed
+    known = [one for one in (segment, narrowed) if not isinstance(one, str)]
+    profiles = (_with_profile(one, indexed) for one in known)
+    return [*[one for one in profiles if one is not None][:1], *known[1:]]
 
 
 def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:

@@ -24,7 +24,7 @@ from cylx.evidence.measures import (
     shape_of,
 )
 from cylx.evidence.surroundings import continuation, emptiness, flank
-from cylx.evidence.weights import weigh, weigh_blend
+from cylx.evidence.weights import weigh, weigh_blend, weigh_profile
 from cylx.geometry.arrays import IndexArray
 from cylx.geometry.coverage import covered_angle
 from cylx.records import IndexedCloud, Segment
@@ -114,7 +114,7 @@ def verify(
     confidence = round(probability, 3)  # further digits would order equals by chance
     reason = broken_limit(measures, len(points), coverage, config)
     if arc:
-        confidence = round(weigh_blend(known), 3)
+        confidence = round((weigh_blend if segment.wedge is None else weigh_profile)(known), 3)
     if not reason and confidence < config.min_confidence:
         reason = worst
     return Verdict(reason, confidence, measures, coverage, points, *errors, blend=arc)

@@ -55,7 +55,7 @@ MORE = {
     **{f"oval, {narrow:g}": partial(oval, narrow) for narrow in (0.8, 0.9)},
     **{f"box, rounded by {radius:g}": partial(rounded_box, radius) for radius in (0.06, 0.16)},
     "ellipsoid, 1.5 : 1 : 0.95": partial(ellipsoid, (1.5, 1.0, 0.95)),
-    **{f"elbow, bent about {bend} r": partial(elbow, bend) for bend in (4, 6)},
+    **{f"elbow, bent about {bend} r": partial(elbow, bend) for bend in (4, 6, 12, 20)},
     "cone, half angle 7°": partial(cone, 7),
 }
 ALL = {**{name: draw for name, draw in THINGS.items() if name not in WITHOUT_FITS}, **MORE}
