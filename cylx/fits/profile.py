@@ -8,6 +8,7 @@ well, and so the arc has one unknown left: its radius if the lines meet, the pla
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -207,7 +208,7 @@ def _slide(
     return middle + place * along, own, float(tried[20]) - least, float(tried.max()) - least
 
 
-def _least(cost, low: float, high: float) -> float:
+def _least(cost: Callable[[float], float], low: float, high: float) -> float:
     """Return where a function of one minimum between two values is least (golden sections)."""
     ratio = 0.5 * (math.sqrt(5.0) - 1.0)
     one, two = high - ratio * (high - low), low + ratio * (high - low)

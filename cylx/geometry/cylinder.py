@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.numerics import cross, fill_basis
 
 POINT, DIRECTION, RADIUS = slice(0, 3), slice(3, 6), 6
@@ -183,6 +183,19 @@ def points_on(points: FloatArray, model: FloatArray, width: float) -> tuple[Floa
     heights, residuals, angles = np.empty(len(points)), np.empty(len(points)), np.empty(len(points))
     n = fill_coordinates(points, model, width, heights, residuals, angles)
     return heights[:n], angles[:n]
+
+
+def distances_to(points: FloatArray, model: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return heights of points (n, 3) along a cylinder (7,), and their distances from its surface; shape (n,) each."""
+    away = points - model[POINT]
+    heights = away @ model[DIRECTION]
+    distances = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0))
+    return heights, np.abs(distances - model[RADIUS])
+
+
+def are_on(points: FloatArray, model: FloatArray, width: float) -> MaskArray:
+    """Return which points (n, 3) lie within `width` of the surface of a cylinder (7,), however far along it."""
+    return np.asarray(distances_to(points, model)[1] < width, dtype=np.bool_)
 
 
 def coordinates_of(

@@ -18,7 +18,7 @@ FAINT = 0.2
 FULL_PIECE = 12.0
 """Number of points that a piece of the height should hold."""
 LEAP = 3.0
-"""A gap is bridged if it is no longer than so many times what was filled before it: two discs on one axis are no pipe."""
+"""A gap is bridged if it is at most so many times what was filled before it: two discs on one axis are no pipe."""
 LONE = 6.0
 """An outermost point is a stray if the third point from the end lies further in by more than this many usual gaps; with
 evenly spread points one in sixty does."""

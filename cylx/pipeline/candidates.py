@@ -19,6 +19,7 @@ from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
 from cylx.stages.local_slices import slice_windows
 from cylx.stages.patches import find_curved_patches
+from cylx.stages.rims import find_rims
 from cylx.stages.slicing import cut_slice, draw_planes
 
 LARGE = 6.0
@@ -45,15 +46,25 @@ def windows_and_explained(prepared: Prepared, log: StageLog) -> tuple[Candidates
 def candidates_of_patches(
     prepared: Prepared, explained: Explained, log: StageLog
 ) -> tuple[Candidates, Candidates, NDArray[np.float32] | None]:
-    """Propose candidates from the nearest points of each point, and from circles about the normals of planes; also return the normals, if the noise shows them."""
-    frame, config = prepared.frame, prepared.config
-    if "curvature" not in config.candidates.sources:
-        return Candidates.joined([]), Candidates.joined([]), None
-    found, rims, normals, report = find_curved_patches(
-        frame, explained, prepared.radii, config.candidates, prepared.threads
-    )
+    """Propose candidates from the nearest points of each point, and from circles about the normals of planes.
+
+    Returns
+    -------
+    patches, rims : Candidates
+    normals : ndarray of shape (N, 3), float32, or None
+        Of `Nearby`; None if the noise hides them everywhere.
+    """
+    frame, config, threads = prepared.frame, prepared.config.candidates, prepared.threads
+    none = Candidates.joined([])
+    if "curvature" not in config.sources:
+        return none, none, None
+    patches, nearby, report = find_curved_patches(frame, explained, prepared.radii, config, threads)
     log.reports.append(report)
-    return found, rims, normals
+    if nearby is None:
+        return patches, none, None
+    rims, report = find_rims(frame, explained, nearby, prepared.radii, threads)
+    log.reports.append(report)
+    return patches, rims, nearby.normals
 
 
 def cut_slices(prepared: Prepared, flatness: FloatArray, log: StageLog) -> list[Slice | None]:

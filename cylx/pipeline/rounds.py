@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from cylx.game.agreement import Neighbourhood, is_contradicted
+from cylx.game.agreement import Neighbourhood
 from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.cylinder import are_on
+from cylx.pipeline.judging import Judge
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
-from cylx.scene import Prepared, out_of_range
-from cylx.stages.consensus import is_on, of_one_surface
-from cylx.stages.arcs import arcs_of
-from cylx.stages.averaging import average_cluster, finish, inflation, refine, refit
+from cylx.scene import Prepared
+from cylx.stages.averaging import average_cluster, refine
 from cylx.stages.clustering import CandidateGame
+from cylx.stages.consensus import of_one_surface
 from cylx.stages.extending import extend
 from cylx.stages.measuring import measure_extent
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
-from cylx.stages.verification import Verdict, may_be_arc, verify
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
@@ -48,6 +46,8 @@ class Fitted(NamedTuple):
         Candidates of its cluster.
     payoff : float
         Mean payoff of its cluster.
+    members : ndarray of int
+        The candidates.
     """
 
     segment: Segment
@@ -81,7 +81,7 @@ class Rounds:
         self._config = prepared.config
         self._indexed = indexed
         self._game = game
-        self._all_windows = Neighbourhood(all_windows)
+        self._judge = Judge(prepared, indexed, Neighbourhood(all_windows))
         self._counts: Counter[str] = Counter()
         self.findings: list[Finding] = []
         self.rejected: list[RejectedSegment] = []
@@ -108,15 +108,19 @@ class Rounds:
                 break
             average = average_cluster(self._game.candidates, cluster, self._config.averaging)
             if self._removes:
-                split = of_one_surface(self._game.candidates, cluster, average, self._indexed)
-                if split is not None:
-                    cluster, others = split
-                    average = average_cluster(self._game.candidates, cluster, self._config.averaging)
-                    self._game.restore(others)
-            clusters.append((cluster, average))
-            if self._removes:
+                cluster, average = self._of_one_surface(cluster, average)
                 self._withdraw(average, closely=True)
+            clusters.append((cluster, average))
         return clusters
+
+    def _of_one_surface(self, cluster: Cluster, average: Segment) -> tuple[Cluster, Segment]:
+        """Take one wall of a cluster of several, and put the members of the others back into the game."""
+        split = of_one_surface(self._game.candidates, cluster, average, self._indexed)
+        if split is None:
+            return cluster, average
+        one, others = split
+        self._game.restore(others)
+        return one, average_cluster(self._game.candidates, one, self._config.averaging)
 
     def _withdraw(self, segment: Segment, *, closely: bool) -> None:
         """Take the candidates that a segment explains out of the game, but for those of another wall about its axis."""
@@ -124,7 +128,7 @@ class Rounds:
         places = self._game.candidates.places[explained]
         noise = self._indexed.noise_about(segment.model, segment.half)
         width = max(5.0 * max(noise, segment.spread), OTHER_WALL * segment.radius)
-        self._game.withdraw(explained[np.isnan(places[:, 0]) | is_on(places, segment.model, width)])
+        self._game.withdraw(explained[np.isnan(places[:, 0]) | are_on(places, segment.model, width)])
 
     def fit(self, clusters: list[tuple[Cluster, Segment]]) -> list[Fitted | RejectedSegment]:
         """Fit the averages of clusters to the cloud, over threads."""
@@ -133,7 +137,7 @@ class Rounds:
 
     def _fit_average(self, cluster: Cluster, average: Segment, known: FloatArray) -> Fitted | RejectedSegment:
         support, payoff = len(cluster.members), cluster.payoff
-        if self._config.verification.enabled and is_contradicted(self._all_windows.agreement(average)):
+        if self._config.verification.enabled and self._judge.is_contradicted(average):
             return RejectedSegment(average, "agreement", support, payoff)
         fitted = (refine if self._config.averaging.refine else measure_extent)(average, self._indexed)
         if isinstance(fitted, str):
@@ -144,10 +148,8 @@ class Rounds:
 
     def verify(self, segments: list[Fitted | RejectedSegment], log: StageLog) -> None:
         """Judge the fitted segments, over threads; take what the accepted ones explain out of the game."""
-        judged = self._over_threads(lambda one: self._judge_in_pieces(one) if isinstance(one, Fitted) else [one], segments)
-        if self._removes:
-            for one in segments:
-                self._restore_beyond(one) if isinstance(one, Fitted) else None
+        judged = self._over_threads(self._outcomes_of, segments)
+        self._restore_beyond([one for one in segments if isinstance(one, Fitted)])
         for outcome in (one for outcomes in judged for one in outcomes):
             found = self._new_or_known(outcome)
             if isinstance(found, Finding):
@@ -161,17 +163,22 @@ class Rounds:
                 self._withdraw(found.segment, closely=closely)
             log.advance()
 
-    def _restore_beyond(self, one: Fitted) -> None:
-        """Put the members of a cluster back into the game that were laid beyond the ends of what it led to."""
-        places = self._game.candidates.places[one.members]
-        heights = (places - one.segment.point) @ one.segment.direction
-        self._game.restore(one.members[np.abs(heights) > one.segment.half + one.segment.radius])
+    def _outcomes_of(self, one: Fitted | RejectedSegment) -> list[Finding | RejectedSegment]:
+        """Judge a segment: it, or the pieces of it that are cylinders."""
+        return self._judge.in_pieces(one.segment, one.support, one.payoff) if isinstance(one, Fitted) else [one]
+
+    def _restore_beyond(self, fitted: list[Fitted]) -> None:
+        """Put the members of clusters back into the game that were laid beyond the ends of what these led to."""
+        for one in fitted if self._removes else []:
+            places = self._game.candidates.places[one.members]
+            heights = (places - one.segment.point) @ one.segment.direction
+            self._game.restore(one.members[np.abs(heights) > one.segment.half + one.segment.radius])
 
     def _new_or_known(self, found: Finding | RejectedSegment) -> Finding | RejectedSegment:
-        """Reject a finding that another cluster of the same round has led to before."""
+        """Reject a finding that another cluster of the same round, or a piece of another whole, has led to before."""
         if not (self._removes and isinstance(found, Finding)):
             return found
-        known = as_rows([finding.segment for finding in self.findings[-ROUND:]])
+        known = as_rows([finding.segment for finding in self.findings])
         return RejectedSegment.of(found, FOUND_BEFORE) if is_part_of(found.segment, known) else found
 
     def report(self, log: StageLog) -> None:
@@ -186,10 +193,10 @@ class Rounds:
         strayed: list[RejectedSegment] = []
         if self._config.averaging.merge:
             distinct = drop_claimed(findings, len(self._indexed.points))
-            pieces = merge_pieces(distinct, self._indexed, self._join)
-            longer = self._over_threads(lambda piece: extend(piece, self._indexed, self._join), pieces)
+            pieces = merge_pieces(distinct, self._indexed, self._judge.join)
+            longer = self._over_threads(lambda piece: extend(piece, self._indexed, self._judge.join), pieces)
             if any(one is not other for one, other in zip(longer, pieces, strict=True)):
-                pieces = merge_pieces(longer, self._indexed, self._join)
+                pieces = merge_pieces(longer, self._indexed, self._judge.join)
             kept = drop_claimed(pieces, len(self._indexed.points))
             for before, after in ((findings, distinct), (pieces, kept)):
                 there = {id(finding) for finding in after}
@@ -198,8 +205,8 @@ class Rounds:
             joined = len(distinct) - len(pieces)
             claimed = len(findings) - joined - len(kept)
         if self._config.averaging.refine:
-            finished = self._over_threads(self._finish, kept)
-            reasons = [self._out_of_range(one.segment) for one in finished]
+            finished = self._over_threads(self._judge.finish, kept)
+            reasons = [self._judge.out_of_range(one.segment) for one in finished]
             both = list(zip(finished, reasons, strict=True))
             strayed = [RejectedSegment.of(one, reason) for one, reason in both if reason]
             kept = [one for one, reason in both if not reason]
@@ -226,25 +233,13 @@ class Rounds:
         if not blends:
             return []
         distinct = drop_claimed(blends, count, cylinders)
-        pieces = merge_pieces(distinct, self._indexed, self._join_blend)
-        kept = self._over_threads(self._finish, drop_claimed(pieces, count, cylinders))
-        kept = [one for one in kept if not self._out_of_range(one.segment)]
+        pieces = merge_pieces(distinct, self._indexed, self._judge.join_blend)
+        kept = self._over_threads(self._judge.finish, drop_claimed(pieces, count, cylinders))
+        kept = [one for one in kept if not self._judge.out_of_range(one.segment)]
         joined = len(distinct) - len(pieces)
         counts = {"joined": joined, "claimed by a better one": len(blends) - joined - len(kept)}
         log.report("blends", len(blends), len(kept), {reason: n for reason, n in counts.items() if n})
         return sorted(kept, key=lambda finding: (-finding.confidence, -len(finding.points)))
-
-    def _finish(self, finding: Finding) -> Finding:
-        """Fit a finding to all its points; up to here a sample of them was enough."""
-        inflated = inflation(finding.measures)
-        fitted = finish(
-            finding.segment, self._indexed, self._prepared.known, self._prepared.catalogue, inflated=inflated
-        )
-        if isinstance(fitted, str):
-            return finding
-        if finding.segment.wedge is not None:  # fitted with what it touches
-            fitted = replace(finding.segment, covariance=fitted.covariance)
-        return replace(finding, segment=fitted)
 
     def _enough(self) -> bool:
         """Return whether to stop early: the paper's order is that of the clusters, ours that of the cylinders."""
@@ -254,95 +249,3 @@ class Rounds:
     def _over_threads(self, work: Callable[[Item], Outcome], items: list[Item]) -> list[Outcome]:
         with ThreadPoolExecutor(self._prepared.threads) as pool:
             return list(pool.map(work, items))
-
-    def _join(self, segment: Segment, best: Finding) -> Finding | None:
-        """Refit and judge a joined segment in the light of the better of its parts."""
-        fitted = refit(segment, self._indexed)
-        found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
-        return found if isinstance(found, Finding) and not found.blend else None
-
-    def _join_blend(self, segment: Segment, best: Finding) -> Finding | None:
-        """Refit and judge a joined blend in the light of the better of its parts."""
-        fitted = refit(segment, self._indexed)
-        found = fitted if isinstance(fitted, str) else self._judge(fitted, best.support, best.payoff)
-        return found if isinstance(found, Finding) and found.blend else None
-
-    def _judge_in_pieces(self, one: Fitted) -> list[Finding | RejectedSegment]:
-        """Verify a segment; where a whole has not the form of a cylinder, look for pieces of it that have."""
-        whole = self._judge(one.segment, one.support, one.payoff)
-        if isinstance(whole, Finding) or not is_long_and_uneven(whole):
-            return [whole]
-        pieces: list[Finding | RejectedSegment] = []
-        queue = halves(one.segment)
-        while queue:
-            piece = queue.pop(0)
-            fitted = refit(piece, self._indexed, most=20000)
-            if isinstance(fitted, str):
-                continue
-            found = self._judge(fitted, one.support, one.payoff)
-            if isinstance(found, Finding):
-                if found.measures["deviation_radii"]<=MOST_UNEVEN: pieces.append(found)
-            elif is_long_and_uneven(found):
-                queue += halves(piece)
-        return pieces or [whole]
-
-    def _judge(self, segment: Segment, support: int, payoff: float) -> Finding | RejectedSegment:
-        """Verify a segment; what speaks most against it if it does not pass."""
-        if reason := self._out_of_range(segment):
-            return RejectedSegment(segment, reason, support, payoff)
-        counts = self._all_windows.agreement(segment)
-        verdict = verify(segment, self._indexed, payoff, counts, self._config.verification)
-        reason, limits = verdict.reason, self._config.verification
-        if verdict.measures and not limits.enabled:
-            reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""
-        if limits.enabled and limits.blends and may_be_arc(verdict, surely=not reason):
-            arc = self._judge_arc(segment, support, payoff)
-            if arc is not None:
-                return arc
-        if reason:
-            confidence = verdict.confidence if verdict.measures else None
-            return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
-        return _finding(segment, verdict, support, payoff)
-
-    def _judge_arc(self, segment: Segment, support: int, payoff: float) -> Finding | None:
-        """Verify a segment as an arc that goes on tangentially; None if it is none."""
-        for arc in arcs_of(segment, self._indexed):
-            if self._out_of_range(arc):
-                continue
-            counts = self._all_windows.agreement(arc)
-            verdict = verify(arc, self._indexed, payoff, counts, self._config.verification, arc=True)
-            if not verdict.reason and may_be_arc(verdict):
-                return _finding(arc, verdict, support, payoff)
-        return None
-
-    def _out_of_range(self, segment: Segment) -> str:
-        return out_of_range(segment, self._prepared.radii, self._config.scene)
-
-
-def is_long_and_uneven(one):
-    m=one.measures
-    return bool(m) and one.reason in ("form","agreement","other shape","lack of fit","bend","bulge","slope","facets") and m["height_radii"]>=2*SHORTEST_PIECE and m["structure_radii"]>UNEVEN
-
-def halves(segment):
-    out=[]
-    for sign in (-.5,.5):
-        model=segment.model.copy(); model[:3]+=sign*segment.half*model[3:6]
-        out.append(replace(segment,model=model,half=.5*segment.half))
-    return out
-SHORTEST_PIECE=5.0
-UNEVEN=.02
-MOST_UNEVEN=.11
-
-def _finding(segment: Segment, verdict: Verdict, support: int, payoff: float) -> Finding:
-    return Finding(
-        segment,
-        verdict.points,
-        support,
-        payoff,
-        verdict.confidence,
-        verdict.coverage,
-        verdict.offset_error,
-        verdict.tilt_error,
-        verdict.measures,
-        verdict.blend,
-    )

@@ -20,7 +20,7 @@ from cylx.records.cylinders import (
     Segment,
 )
 from cylx.records.progress import Observer, SilentObserver, StageReport
-from cylx.records.scales import CELL, Explained, Scale
+from cylx.records.scales import CELL, Explained, Nearby, Scale
 from cylx.records.sources import Crop, Selection, Source
 from cylx.records.streams import stream
 
@@ -36,6 +36,7 @@ __all__ = [
     "Finding",
     "Frame",
     "IndexedCloud",
+    "Nearby",
     "Noise",
     "NominalRadius",
     "Observer",

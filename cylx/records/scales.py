@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.morton import cell_starts, group, pick_one
@@ -97,6 +98,25 @@ class Explained:
 
     flatness: FloatArray
     curved: MaskArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Nearby:
+    """What the nearest points of each point show of the surface.
+
+    Parameters
+    ----------
+    normals : ndarray of shape (N, 3), float32
+        Unit normals, either way; zero where the points do not tell.
+    looked_at : ndarray of int
+        Indices of the points that were looked at: those in no large flat window.
+    within : ndarray of bool
+        Which of these lie within a plane, and not at its edge.
+    """
+
+    normals: NDArray[np.float32]
+    looked_at: IndexArray
+    within: MaskArray
 
 
 def _without_slivers(members: IndexArray, voxels: IndexArray, runs: IndexArray) -> tuple[IndexArray, ...]:

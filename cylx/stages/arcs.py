@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,6 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import RADIUS, coordinates_of
 from cylx.geometry.numerics import fill_basis
 from cylx.records import IndexedCloud, Segment
-from cylx.stages.averaging import ENOUGH_TO_JUDGE, refit
 
 ARC_FLAT, ARC_STEPS = 0.2, 4
 """Points of flat windows of this share of what is too flat are not of an arc, and so many fits settle it."""
@@ -28,7 +28,7 @@ MOST_CHI_SQUARE = 2.0
 """Mean square, in squared deviations and clipped at nine, of the residuals of its points."""
 
 
-def arcs_of(segment: Segment, indexed: IndexedCloud) -> list[Segment]:
+def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], Segment | str]) -> list[Segment]:
     """Fit a cylinder again as an arc between planes that touch it.
 
     An arc between two planes takes some of their points within the noise, and its radius comes out too large. Where
@@ -38,6 +38,8 @@ def arcs_of(segment: Segment, indexed: IndexedCloud) -> list[Segment]:
     ----------
     segment : Segment
     indexed : IndexedCloud
+    refit : callable
+        Fits a segment to its points; why there is none if that fails.
 
     Returns
     -------
@@ -48,7 +50,7 @@ def arcs_of(segment: Segment, indexed: IndexedCloud) -> list[Segment]:
     for _ in range(ARC_STEPS):
         if isinstance(narrowed, str):
             break
-        narrowed = refit(narrowed, indexed, most=ENOUGH_TO_JUDGE)
+        narrowed = refit(narrowed)
     known = [one for one in (segment, narrowed) if not isinstance(one, str)]
     profiles = (_with_profile(one, indexed) for one in known)
     return [*[one for one in profiles if one is not None][:1], *known[1:]]
@@ -79,7 +81,9 @@ def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
     moved = model.copy()
     moved[:3] += profile.center @ basis
     moved[RADIUS] = profile.radius
-    return replace(segment, model=moved, spread=deviation, flat_share=1.0, wedge=_wedge(basis, profile.middle, profile.opening))
+    return replace(
+        segment, model=moved, spread=deviation, flat_share=1.0, wedge=_wedge(basis, profile.middle, profile.opening)
+    )
 
 
 def _wedge(basis: FloatArray, middle: float, opening: float) -> FloatArray:

@@ -19,7 +19,7 @@ from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.fits.nominal_radius import Catalogue, choose_entry
 from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder, unbiased_radius
 from cylx.geometry.arrays import FloatArray
-from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, points_on
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, distances_to, points_on
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Segment
@@ -177,17 +177,15 @@ def _narrowed(points: FloatArray, model: FloatArray, half: float, shell: float, 
 
     Other surfaces about the same axis lie in the wide one as well: the wall of a tube, steps of a shaft.
     """
-    away = points - model[POINT]
-    heights = away @ model[DIRECTION]
-    distances = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0))
-    residuals = np.abs(distances - model[RADIUS])[np.abs(heights) <= half]
+    heights, residuals = distances_to(points, model)
+    residuals = residuals[np.abs(heights) <= half]
     all_around = int((residuals < shell).sum())
     for share in NARROW_SHELLS:
         narrow = max(share * model[RADIUS], LEAST_SHELL * noise)
         within = int((residuals < narrow).sum())
         dense = within * (shell - narrow) > NARROW_TIMES * (all_around - within) * narrow
         if narrow < shell and within >= LEAST_POINTS_OF_AVERAGE and dense:
-            return narrow
+            return float(narrow)
     return shell
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.geometry.arrays import IndexArray
+from cylx.geometry.cylinder import are_on
 from cylx.records import Candidates, Cluster, IndexedCloud, Segment
 
 WIDTH_NOISES, WIDTH_RADII = 5.0, 0.01
@@ -51,24 +52,16 @@ def of_one_surface(
     if known.sum() < 2 * LEAST_WINDOWS:
         return None
     width = max(WIDTH_NOISES * indexed.noise_about(average.model, average.half), WIDTH_RADII * average.radius)
-    on = known & is_on(places, average.model, width)
+    on = known & are_on(places, average.model, width)
     if on.sum() >= ENOUGH * known.sum():
         return None
     best, most = on, LEAST_GAIN * float(on.sum())
     for i in cluster.members[np.argsort(-cluster.weights, kind="stable")[:MOST_TRIED]]:
-        own = known & is_on(places, candidates.models[i], width)
-        beside = known & is_on(places, candidates.models[i], WIDER * width) & ~own
+        own = known & are_on(places, candidates.models[i], width)
+        beside = known & are_on(places, candidates.models[i], WIDER * width) & ~own
         if own.sum() > most and beside.sum() <= MOST_BESIDE * own.sum():
             best, most = own, float(own.sum())
     if best is on or best.sum() < LEAST_WINDOWS:
         return None
     weights = cluster.weights[best]
     return Cluster(cluster.members[best], weights / weights.sum(), cluster.payoff), cluster.members[known & ~best]
-
-
-def is_on(places: FloatArray, model: FloatArray, width: float) -> MaskArray:
-    """Return which places lie within `width` of the surface of a cylinder, however far along it."""
-    away = places - model[:3]
-    heights = away @ model[3:6]
-    distances = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0))
-    return np.asarray(np.abs(distances - model[6]) < width, dtype=np.bool_)

@@ -12,11 +12,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from cylx.evidence.ends import ends_in_cut
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.coverage import sector_of
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
-from cylx.stages.pieces import ends_in_cut
 from cylx.records import Finding, IndexedCloud, Segment
 
 Judge = Callable[[Segment, Finding], Finding | None]

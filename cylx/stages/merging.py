@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from cylx.evidence.ends import are_distinct
 from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
-from cylx.stages.pieces import are_distinct
 
 LEAST_COSINE_OF_PIECES = math.cos(math.radians(8.0))
 """Axes of two pieces of one pipe differ less; the rest is decided by a fit to both."""

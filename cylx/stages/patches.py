@@ -20,8 +20,7 @@ from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.patches import SIZE, TERMS, choose_patches, find_planar, fit_patches, osculating_of
-from cylx.records import Candidates, Explained, Frame, StageReport
-from cylx.stages.rims import directions_of, find_rims, normals_of_planes
+from cylx.records import Candidates, Explained, Frame, Nearby, StageReport
 
 MOST_NOISE = 0.28
 """Noise in spacings up to which patches of sixteen points show the curvature of a surface."""
@@ -51,17 +50,15 @@ OUTCOMES = ("no curvature", "does not fit", "badly supported", "kept")
 
 def find_curved_patches(
     frame: Frame, explained: Explained, radius_range: tuple[float, float], config: CandidatesConfig, threads: int
-) -> tuple[Candidates, Candidates, NDArray[np.float32] | None, StageReport]:
+) -> tuple[Candidates, Nearby | None, StageReport]:
     """Propose a cylinder for each patch of nearest points that is curved one way.
 
     Returns
     -------
     candidates : Candidates
         Of patches, which are drawn evenly over the surface.
-    rims : Candidates
-        Of circles, as `find_rims` says.
-    normals : ndarray of shape (N, 3), float32, or None
-        Unit normals, either way; zero where the patches do not tell. None if the noise hides them everywhere.
+    nearby : Nearby or None
+        None if the noise hides what the nearest points show.
     report : StageReport
     """
     noise = frame.noise.least
@@ -69,7 +66,7 @@ def find_curved_patches(
     which = np.flatnonzero(explained.flatness <= (2.01 * frame.window if peeled else 0.0))
     which = which[:: 1 + len(which) // MOST_PATCHES]
     if noise > MOST_NOISE or len(which) < SIZE:
-        return Candidates.joined([]), Candidates.joined([]), None, StageReport("patches", 0, 0, {})
+        return Candidates.joined([]), None, StageReport("patches", 0, 0, {})
     normals = np.zeros((len(frame.points), 3), np.float32)
     level = max(0, round(math.log2(REACH[0] / frame.unit)))
     side = frame.unit * 2.0**level
@@ -82,10 +79,11 @@ def find_curved_patches(
     if peeled:
         _in_parts(peel, len(which), threads)
     normals[which] = planes
+    within = planar & planes.any(axis=1)
     # what lies on no plane is looked at by itself, so that no patch of it crosses an edge
     rest = which[~planar]
     if len(rest) < SIZE:
-        return Candidates.joined([]), Candidates.joined([]), normals, StageReport("patches", 0, 0, {})
+        return Candidates.joined([]), Nearby(normals, which, within), StageReport("patches", 0, 0, {})
     points, every = np.ascontiguousarray(frame.points[rest]), np.arange(len(rest))
     own_cells, own_starts = cell_starts(frame.codes[rest], level)
     patches, members = np.empty((len(rest), TERMS)), np.empty((len(rest), SIZE), np.int64)
@@ -99,11 +97,6 @@ def find_curved_patches(
     sharp = (owners >= 0) & (patches[owners, 13] < np.maximum(3.0 * noise, SHARP * patches[owners, 14]))
     own[~sharp] = 0.0
     normals[rest] = own
-    edges = which[planar & ~planes.any(axis=1)]  # what lies within a plane is no wall
-    rims, _ = find_rims(
-        np.concatenate([points, frame.points[edges]]), np.concatenate([normals[rest], normals[edges]]),
-        directions_of(np.concatenate([normals_of_planes(frame.points, cells, starts, side, explained.flatness), planes[planar].astype(np.float64)])), noise, radius_range, threads,
-    )  # fmt: skip
     seeds = np.unique(owners[sharp])
     seeds = seeds[:: 1 + len(seeds) // MOST_SEEDS]
     kept_patches = patches[seeds]
@@ -122,7 +115,7 @@ def find_curved_patches(
     found = Candidates.of_windows(kept[:, :9], kept[:, 9], points[seeds[outcome == 3]])
     counts = np.bincount(outcome, minlength=4)
     rejected = {name: int(n) for name, n in zip(OUTCOMES[:3], counts[:3], strict=True) if n}
-    return found, rims, normals, StageReport("patches", len(seeds), len(kept) + len(rims), rejected)
+    return found, Nearby(normals, which, within), StageReport("patches", len(seeds), len(kept), rejected)
 
 
 def _in_parts(work: Callable[[slice], None], count: int, threads: int) -> None:

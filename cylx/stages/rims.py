@@ -12,12 +12,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray, IndexArray
-from cylx.geometry.morton import gather_ball
+from cylx.geometry.circles import LEAST_ON, fill_circle
+from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.numerics import fill_basis, symmetric_eigen
-from cylx.records import Candidates, StageReport
+from cylx.records import Candidates, Explained, Frame, Nearby, StageReport
 
 MOST_DIRECTIONS = 6
 """Directions of planes that are tried."""
@@ -37,43 +37,28 @@ REACHES = (4.0, 10.0, 25.0, 60.0)
 """Circles are looked for among what lies within so many spacings."""
 RADII = 0.3, 1.1
 """Radii of them, as shares of the reach."""
-NEAREST = 10
-"""Points that show the tangent."""
 MOST_SEEN = 1500
 """Points that suffice about a place."""
-TRIALS, ENOUGH_TO_TRY = 30, 250
-"""Second points that are tried, each on so many of the points."""
-DEVIATIONS, SHARE = 3.0, 0.01
-"""Points are on a circle within so many deviations and this share of the radius."""
 LEAST_EXTENT = 4.0
 """Extent of a candidate along its axis in spacings, at least: its ends are to be found about a circle, too."""
+CELL_SIDE = 2.6
+"""Side of the cells, spacings, as near as they have it."""
 WIDEST, CAPACITY = 6.0, 512
 """Spacings about a point in which it is asked for a plane, and points that are gathered."""
-SECTORS = 24
-LEAST_SECTORS, LEAST_ON, LEAST_CONTRAST = 6, 14, 2.5
-"""Sectors of 24 and points that a circle has at least; and how many times denser points are on it than beside it."""
 
 
 def find_rims(
-    points: FloatArray,
-    normals: NDArray[np.float32],
-    directions: list[FloatArray],
-    noise: float,
-    radius_range: tuple[float, float],
-    threads: int,
+    frame: Frame, explained: Explained, nearby: Nearby, radius_range: tuple[float, float], threads: int
 ) -> tuple[Candidates, StageReport]:
     """Propose a cylinder for each circle about the direction of a plane.
 
     Parameters
     ----------
-    points : ndarray of shape (n, 3)
-        Frame units.
-    normals : ndarray of shape (n, 3), float32
-        Unit normals, either way; zero where unknown.
-    directions : list of ndarray of shape (3,)
-        From `directions_of`.
-    noise : float
-        Standard deviation of the points.
+    frame : Frame
+    explained : Explained
+        Its flat windows are pieces of planes.
+    nearby : Nearby
+        From `find_curved_patches`.
     radius_range : tuple of float
     threads : int
 
@@ -82,61 +67,61 @@ def find_rims(
     candidates : Candidates
     report : StageReport
     """
-    parts = []
-    tried = 0
+    planes = nearby.normals[nearby.looked_at[nearby.within]].astype(np.float64)
+    directions = directions_of(np.concatenate([_normals_of_planes(frame, explained.flatness), planes]))
+    which = nearby.looked_at[~nearby.within]  # what lies within a plane is no wall
+    parts, tried = [], 0
     for direction in directions:
-        basis = np.empty((2, 3))
-        fill_basis(direction, basis)
-        which = np.flatnonzero(np.abs(normals @ direction.astype(np.float32)) < ACROSS)
-        if len(which) < LEAST_ON:
+        upright = which[np.abs(nearby.normals[which] @ direction.astype(np.float32)) < ACROSS]
+        if len(upright) < LEAST_ON:
             continue
-        heights = points[which] @ direction
-        order = np.argsort(heights, kind="stable")
-        which, heights = which[order], heights[order]
-        flat = np.ascontiguousarray(points[which] @ basis.T)
-        seeds = np.arange(0, len(which), 1 + len(which) // MOST_SEEDS)
-        rows = np.zeros((len(seeds), len(REACHES), 6))
-
-        def look(part: slice, flat=flat, heights=heights, seeds=seeds, rows=rows) -> None:  # noqa: ANN001
-            _find_circles(flat, heights, seeds[part], noise, *radius_range, rows[part])
-
-        step = max(1, -(-len(seeds) // (8 * threads)))
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(look, [slice(first, first + step) for first in range(0, len(seeds), step)]))
-        tried += len(seeds)
-        for level, reach in enumerate(REACHES):
-            own = rows[:, level]
-            good = own[:, 2] > 0.0
-            own = own[good]
-            if not len(own):
-                continue
-            model = np.zeros((len(own), 9))
-            model[:, :3] = own[:, :2] @ basis + own[:, 3:4] * direction
-            model[:, 3:6], model[:, 6] = direction, own[:, 2]
-            model[:, 7], model[:, 8] = own[:, 5], np.maximum(2.5 * own[:, 4], LEAST_EXTENT)
-            parts.append(Candidates.of_windows(model, 0.5 * reach, points[which[seeds[good]]]))
-    found = Candidates.joined(parts)
-    return found, StageReport("rims", tried, len(found), {})
+        found, count = _about(frame.points[upright], direction, frame.noise.least, radius_range, threads)
+        parts.append(found)
+        tried += count
+    candidates = Candidates.joined(parts)
+    return candidates, StageReport("rims", tried, len(candidates), {})
 
 
-def normals_of_planes(
-    points: FloatArray, cells: IndexArray, starts: IndexArray, side: float, flatness: FloatArray
-) -> FloatArray:
-    """Return the normals of planes at some of the points in flat windows, either way.
+def _about(
+    points: FloatArray, direction: FloatArray, noise: float, radius_range: tuple[float, float], threads: int
+) -> tuple[Candidates, int]:
+    """Propose cylinders about one direction; also say how many places were looked at."""
+    basis = np.empty((2, 3))
+    fill_basis(direction, basis)
+    heights = points @ direction
+    order = np.argsort(heights, kind="stable")
+    points, heights = points[order], heights[order]
+    flat = np.ascontiguousarray(points @ basis.T)
+    seeds = np.arange(0, len(points), 1 + len(points) // MOST_SEEDS)
+    rows = np.zeros((len(seeds), len(REACHES), 6))
 
-    Parameters
-    ----------
-    points : ndarray of shape (N, 3)
-        In Morton order.
-    cells, starts, side
-        As for `gather_ball`.
-    flatness : ndarray of shape (N,)
-        Radius of the largest flat window that holds a point, or 0.
-    """
+    def look(part: slice) -> None:
+        _find_circles(flat, heights, seeds[part], noise, *radius_range, rows[part])
+
+    step = max(1, -(-len(seeds) // (8 * threads)))
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(look, [slice(first, first + step) for first in range(0, len(seeds), step)]))
+    parts = []
+    for level, reach in enumerate(REACHES):
+        good = rows[:, level, 2] > 0.0
+        own = rows[good, level]
+        models = np.zeros((len(own), 9))
+        models[:, :3] = own[:, :2] @ basis + own[:, 3:4] * direction
+        models[:, 3:6], models[:, 6] = direction, own[:, 2]
+        models[:, 7], models[:, 8] = own[:, 5], np.maximum(2.5 * own[:, 4], LEAST_EXTENT)
+        parts.append(Candidates.of_windows(models, 0.5 * reach, points[seeds[good]]))
+    return Candidates.joined(parts), len(seeds)
+
+
+def _normals_of_planes(frame: Frame, flatness: FloatArray) -> FloatArray:
+    """Return the normals of planes at some of the points in flat windows, either way."""
+    level = max(0, round(math.log2(CELL_SIDE / frame.unit)))
+    cells, starts = cell_starts(frame.codes, level)
     which = np.flatnonzero(flatness > 0.0)
     which = which[:: 1 + len(which) // ENOUGH_NORMALS]
     normals = np.zeros((len(which), 3))
-    _fill_normals(points, cells, starts, side, which, np.minimum(flatness[which], WIDEST), normals)
+    radii = np.minimum(flatness[which], WIDEST)
+    _fill_normals(frame.points, cells, starts, frame.unit * 2.0**level, which, radii, normals)
     return normals[np.any(normals != 0.0, axis=1)]
 
 
@@ -196,8 +181,15 @@ def directions_of(normals: FloatArray) -> list[FloatArray]:
 
 @njit(cache=True, nogil=True)
 def _find_circles(
-    flat: FloatArray, heights: FloatArray, seeds: IndexArray, noise: float, least: float, greatest: float, rows: FloatArray
+    flat: FloatArray,
+    heights: FloatArray,
+    seeds: IndexArray,
+    noise: float,
+    least: float,
+    greatest: float,
+    rows: FloatArray,
 ) -> None:
+    """Fill in the best circle through each seed for each reach; of radius zero where there is none."""
     x, y, z = np.empty(MOST_SEEN), np.empty(MOST_SEEN), np.empty(MOST_SEEN)
     totals = np.zeros(len(REACHES), np.int64)
     for s in range(len(seeds)):
@@ -223,115 +215,8 @@ def _find_circles(
                         x[n], y[n], z[n] = dx, dy, heights[j]
                         n += 1
                     seen += 1
-            if n >= LEAST_ON and _fill_circle(
+            if n >= LEAST_ON and fill_circle(
                 x, y, z, n, reach, noise, max(RADII[0] * reach, least), min(RADII[1] * reach, greatest), rows[s, level]
             ):
                 rows[s, level, 0] += flat[i, 0]
                 rows[s, level, 1] += flat[i, 1]
-
-
-@njit(cache=True, nogil=True)
-def _fill_circle(
-    x: FloatArray, y: FloatArray, z: FloatArray, n: int, reach: float, noise: float, least: float, most: float, row: FloatArray
-) -> bool:
-    """Fill in centre, radius, mean and half of the range of heights, and points of the best circle through zero."""
-    # the tangent, from the points closest to zero
-    limit = _closest(x, y, n, NEAREST)
-    xx, xy, yy = 0.0, 0.0, 0.0
-    for a in range(n):
-        if x[a] * x[a] + y[a] * y[a] <= limit:
-            xx += x[a] * x[a]
-            xy += x[a] * y[a]
-            yy += y[a] * y[a]
-    angle = 0.5 * math.atan2(2.0 * xy, xx - yy)
-    nx, ny = -math.sin(angle), math.cos(angle)
-    if nx * nx * xx + 2.0 * nx * ny * xy + ny * ny * yy > 0.3 * (xx + yy):
-        return False
-    best, bx, by, br = 0, 0.0, 0.0, 0.0
-    step, thin = max(1, n // TRIALS), 1 + n // ENOUGH_TO_TRY
-    for a in range(0, n, step):
-        square = x[a] * x[a] + y[a] * y[a]
-        along = x[a] * nx + y[a] * ny
-        if square < 0.04 * reach * reach or along == 0.0:
-            continue
-        signed = 0.5 * square / along
-        radius = abs(signed)
-        if radius < least or radius > most:
-            continue
-        cx, cy = signed * nx, signed * ny
-        tolerance, count = DEVIATIONS * noise + 2.0 * SHARE * radius, 0
-        for b in range(0, n, thin):
-            count += 1 if abs(math.sqrt((x[b] - cx) ** 2 + (y[b] - cy) ** 2) - radius) < tolerance else 0
-        if count > best:
-            best, bx, by, br = count, cx, cy, radius
-    if best * thin < LEAST_ON:
-        return False
-    for turn in range(4):
-        bx, by, br = _refined(x, y, n, bx, by, br, DEVIATIONS * noise + SHARE * 0.5 ** min(turn, 2) * br)
-        if not (least <= br <= most):
-            return False
-    return _fill_row(x, y, z, n, bx, by, br, DEVIATIONS * noise + 0.25 * SHARE * br, row)
-
-
-@njit(cache=True, nogil=True)
-def _closest(x: FloatArray, y: FloatArray, n: int, k: int) -> float:
-    """Return the square of the distance of the k-th closest point to zero."""
-    squares = np.empty(n)
-    for a in range(n):
-        squares[a] = x[a] * x[a] + y[a] * y[a]
-    squares.sort()
-    return float(squares[min(k, n) - 1])
-
-
-@njit(cache=True, nogil=True)
-def _refined(
-    x: FloatArray, y: FloatArray, n: int, cx: float, cy: float, radius: float, tolerance: float
-) -> tuple[float, float, float]:
-    """Take one step of a least-squares fit of a circle to the points near it."""
-    a00, a01, a02, a11, a12, a22 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    b0, b1, b2 = 0.0, 0.0, 0.0
-    for a in range(n):
-        dx, dy = x[a] - cx, y[a] - cy
-        distance = math.sqrt(dx * dx + dy * dy)
-        residual = distance - radius
-        if distance > 0.0 and abs(residual) < tolerance:
-            ux, uy = dx / distance, dy / distance
-            a00 += ux * ux
-            a01 += ux * uy
-            a02 += ux
-            a11 += uy * uy
-            a12 += uy
-            a22 += 1.0
-            b0 += ux * residual
-            b1 += uy * residual
-            b2 += residual
-    det = a00 * (a11 * a22 - a12 * a12) - a01 * (a01 * a22 - a12 * a02) + a02 * (a01 * a12 - a11 * a02)
-    if abs(det) < 1e-9 * max(a22, 1.0):
-        return cx, cy, radius
-    one = b0 * (a11 * a22 - a12 * a12) - a01 * (b1 * a22 - a12 * b2) + a02 * (b1 * a12 - a11 * b2)
-    two = a00 * (b1 * a22 - b2 * a12) - b0 * (a01 * a22 - a12 * a02) + a02 * (a01 * b2 - b1 * a02)
-    three = a00 * (a11 * b2 - a12 * b1) - a01 * (a01 * b2 - b1 * a02) + b0 * (a01 * a12 - a11 * a02)
-    return cx + one / det, cy + two / det, radius + three / det
-
-
-@njit(cache=True, nogil=True)
-def _fill_row(
-    x: FloatArray, y: FloatArray, z: FloatArray, n: int, cx: float, cy: float, radius: float, tolerance: float, row: FloatArray
-) -> bool:
-    """Fill in a circle if enough points lie on it, over enough of its turn, and few beside it."""
-    filled = np.zeros(SECTORS, np.bool_)
-    on, beside, low, high, total = 0, 0, math.inf, -math.inf, 0.0
-    for a in range(n):
-        dx, dy = x[a] - cx, y[a] - cy
-        away = abs(math.sqrt(dx * dx + dy * dy) - radius)
-        if away < tolerance:
-            on += 1
-            filled[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * SECTORS) % SECTORS] = True
-            low, high = min(low, z[a]), max(high, z[a])
-            total += z[a]
-        elif away < 3.0 * tolerance:
-            beside += 1
-    if on < LEAST_ON or filled.sum() < LEAST_SECTORS or 2.0 * on < LEAST_CONTRAST * beside:
-        return False
-    row[0], row[1], row[2], row[3], row[4], row[5] = cx, cy, radius, total / on, 0.5 * (high - low), on
-    return True

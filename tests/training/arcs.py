@@ -15,14 +15,14 @@ from collect import done_before
 from references import CAD_NEAR_OF_ARCS, DATA, NOISES, cad_parts
 
 from cylx.config import Config
-from cylx.pipeline import extract_cylinders, rounds
+from cylx.pipeline import extract_cylinders, judging
 from cylx.scene import prepare
 
 
 @contextmanager
 def noted():
     """Take down the segments that are judged as arcs, with the verdicts and payoffs, for a while."""
-    before, found = rounds.verify, []
+    before, found = judging.verify, []
 
     def verify(segment, indexed, payoff, counts, config, *, arc=False):
         verdict = before(segment, indexed, payoff, counts, config, arc=arc)
@@ -30,11 +30,11 @@ def noted():
             found.append((segment, verdict, payoff))
         return verdict
 
-    rounds.verify = verify
+    judging.verify = verify
     try:
         yield found
     finally:
-        rounds.verify = before
+        judging.verify = before
 
 
 def rows_of(scan):

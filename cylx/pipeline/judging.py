@@ -1,0 +1,170 @@
+"""What the rounds make of a fitted segment: a cylinder, an arc that goes on tangentially, pieces of it, or nothing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from cylx.game.agreement import Neighbourhood, is_contradicted
+from cylx.records import Finding, IndexedCloud, RejectedSegment, Segment
+from cylx.scene import Prepared, out_of_range
+from cylx.stages.arcs import arcs_of
+from cylx.stages.averaging import ENOUGH_TO_JUDGE, finish, inflation, refit
+from cylx.stages.verification import Verdict, may_be_arc, verify
+
+SHORTEST_PIECE = 5.0
+"""Pieces of a long segment have at least this height, in radii."""
+UNEVEN, MOST_UNEVEN = 0.02, 0.11
+"""Structure in the residuals, in radii, from which a long segment is looked at in pieces, as a trunk bends and tapers;
+and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
+OF_FORM = frozenset({"form", "agreement", "other shape", "lack of fit", "bend", "bulge", "slope", "facets"})
+"""Reasons that a piece may not have."""
+
+
+class Judge:
+    """Judges segments by the points and the candidates about them.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    indexed : IndexedCloud
+    windows : Neighbourhood
+        What a cylinder should agree with.
+    """
+
+    def __init__(self, prepared: Prepared, indexed: IndexedCloud, windows: Neighbourhood) -> None:
+        self._prepared = prepared
+        self._limits = prepared.config.verification
+        self._indexed = indexed
+        self._windows = windows
+
+    def is_contradicted(self, segment: Segment) -> bool:
+        """Return whether so many windows disagree that a fit would be pointless."""
+        return is_contradicted(self._windows.agreement(segment))
+
+    def out_of_range(self, segment: Segment) -> str:
+        """Return which of the limits given for what is looked for a segment does not keep, or nothing."""
+        return out_of_range(segment, self._prepared.radii, self._prepared.config.scene)
+
+    def in_pieces(self, segment: Segment, support: int, payoff: float) -> list[Finding | RejectedSegment]:
+        """Verify a segment; where a long one has not the form of a cylinder, give the pieces of it that have.
+
+        It is halved until its pieces pass, so that they are as long as may be.
+        """
+        whole = self.judge(segment, support, payoff)
+        if not _may_have_pieces(whole):
+            return [whole]
+        pieces: list[Finding | RejectedSegment] = []
+        left = _halves(segment)
+        while left:
+            piece = left.pop(0)
+            fitted = self._refit(piece)
+            found = fitted if isinstance(fitted, str) else self.judge(fitted, support, payoff)
+            if isinstance(found, Finding) and found.measures["deviation_radii"] <= MOST_UNEVEN:
+                pieces.append(found)
+            elif isinstance(found, RejectedSegment) and _may_have_pieces(found):
+                left += _halves(piece)
+        return pieces or [whole]
+
+    def judge(self, segment: Segment, support: int, payoff: float) -> Finding | RejectedSegment:
+        """Verify a segment; what speaks most against it if it does not pass.
+
+        Parameters
+        ----------
+        segment : Segment
+            Fitted.
+        support : int
+            Candidates of its cluster.
+        payoff : float
+            Mean payoff of its cluster.
+
+        Returns
+        -------
+        Finding or RejectedSegment
+        """
+        if reason := self.out_of_range(segment):
+            return RejectedSegment(segment, reason, support, payoff)
+        limits = self._limits
+        verdict = verify(segment, self._indexed, payoff, self._windows.agreement(segment), limits)
+        reason = verdict.reason
+        if verdict.measures and not limits.enabled:
+            reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""
+        if limits.enabled and limits.blends and may_be_arc(verdict, surely=not reason):
+            arc = self._judge_arc(segment, support, payoff)
+            if arc is not None:
+                return arc
+        if reason:
+            confidence = verdict.confidence if verdict.measures else None
+            return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
+        return _finding(segment, verdict, support, payoff)
+
+    def join(self, segment: Segment, best: Finding) -> Finding | None:
+        """Refit and judge a joined segment in the light of the better of its parts; None if it is no cylinder."""
+        found = self._judge_joined(segment, best)
+        return found if found is not None and not found.blend else None
+
+    def join_blend(self, segment: Segment, best: Finding) -> Finding | None:
+        """Refit and judge a joined blend in the light of the better of its parts; None if it is none."""
+        found = self._judge_joined(segment, best)
+        return found if found is not None and found.blend else None
+
+    def finish(self, finding: Finding) -> Finding:
+        """Fit a finding to all its points; up to here a sample of them was enough."""
+        inflated = inflation(finding.measures)
+        known, catalogue = self._prepared.known, self._prepared.catalogue
+        fitted = finish(finding.segment, self._indexed, known, catalogue, inflated=inflated)
+        if isinstance(fitted, str):
+            return finding
+        if finding.segment.wedge is not None:  # it was fitted with what it touches
+            fitted = replace(finding.segment, covariance=fitted.covariance)
+        return replace(finding, segment=fitted)
+
+    def _judge_joined(self, segment: Segment, best: Finding) -> Finding | None:
+        fitted = refit(segment, self._indexed)
+        found = fitted if isinstance(fitted, str) else self.judge(fitted, best.support, best.payoff)
+        return found if isinstance(found, Finding) else None
+
+    def _judge_arc(self, segment: Segment, support: int, payoff: float) -> Finding | None:
+        """Verify a segment as an arc that goes on tangentially; None if it is none."""
+        for arc in arcs_of(segment, self._indexed, self._refit):
+            if self.out_of_range(arc):
+                continue
+            verdict = verify(arc, self._indexed, payoff, self._windows.agreement(arc), self._limits, arc=True)
+            if not verdict.reason and may_be_arc(verdict):
+                return _finding(arc, verdict, support, payoff)
+        return None
+
+    def _refit(self, segment: Segment) -> Segment | str:
+        return refit(segment, self._indexed, most=ENOUGH_TO_JUDGE)
+
+
+def _may_have_pieces(one: Finding | RejectedSegment) -> bool:
+    """Return whether a segment is long, and refused because of its form."""
+    if isinstance(one, Finding) or not one.measures or one.reason not in OF_FORM:
+        return False
+    return one.measures["height_radii"] >= 2.0 * SHORTEST_PIECE and one.measures["structure_radii"] > UNEVEN
+
+
+def _halves(segment: Segment) -> list[Segment]:
+    """Cut a segment across its axis in the middle."""
+    parts = []
+    for side in (-0.5, 0.5):
+        model = segment.model.copy()
+        model[:3] += side * segment.half * segment.direction
+        parts.append(replace(segment, model=model, half=0.5 * segment.half))
+    return parts
+
+
+def _finding(segment: Segment, verdict: Verdict, support: int, payoff: float) -> Finding:
+    return Finding(
+        segment,
+        verdict.points,
+        support,
+        payoff,
+        verdict.confidence,
+        verdict.coverage,
+        verdict.offset_error,
+        verdict.tilt_error,
+        verdict.measures,
+        verdict.blend,
+    )
