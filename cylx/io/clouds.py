@@ -125,14 +125,14 @@ def _file_name(path: str | Path) -> str:
 def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], bytes | None]:
     """Read the table of a file, and the header of a LAS file; rarely needed readers are imported late."""
     if kind == "las":
-        from cylx.io.las import read_las  # noqa: PLC0415  needs an extra, or for this alone
-        from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  needs an extra, or for this alone
+        from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
+        from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  for this alone
 
-        return read_las(source), kept_header(source, las_header(source))
+        return read_isolated(source, "las"), kept_header(source, las_header(source))
     if kind == "e57":
-        from cylx.io.e57 import read_e57  # noqa: PLC0415  needs an extra, or for this alone
+        from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
 
-        return read_e57(source, scan), None
+        return read_isolated(source, "e57", scan), None
     if kind == "npy":
         from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone
 
