@@ -37,6 +37,22 @@ def pytest_xdist_auto_num_workers(config):
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _kept_readers():
+    """Read LAS and E57 in processes that stay, as starting one for each file takes a quarter of a second."""
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    from cylx.io import isolated
+    from tests.support.kept_readers import KeptReaders
+
+    readers, fresh = KeptReaders(), isolated.read_isolated
+    isolated.read_isolated = readers.read_isolated
+    yield
+    isolated.read_isolated = fresh
+    readers.close()
+
+
 @pytest.fixture
 def run_cylx():
     """Run the command line in this process: `run_cylx("info", path)` gives exit_code, stdout and stderr."""

@@ -16,6 +16,7 @@ from cylx.io.packed import unpacked
 from cylx.io.pcd import read_pcd, write_pcd
 from cylx.io.ply import ROWS_AT_A_TIME, ply_type, read_ply, write_ply
 from cylx.io.xyz import read_xyz, write_xyz
+from cylx.optional.extras import require
 from cylx.records import PointCloud, Selection, Source
 
 if TYPE_CHECKING:
@@ -128,10 +129,14 @@ def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void],
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
         from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  for this alone
 
-        return read_isolated(source, "las"), kept_header(source, las_header(source))
+        facts = las_header(source)
+        libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
+        require(*libraries, place=source.place, needed_by="", error=InputError, imported=False)
+        return read_isolated(source, "las"), kept_header(source, facts)
     if kind == "e57":
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
 
+        require("pye57", place=source.place, needed_by="", error=InputError, imported=False)
         return read_isolated(source, "e57", scan), None
     if kind == "npy":
         from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone

@@ -106,6 +106,11 @@ class Reader:
         """Kill the process."""
         self._stack.close()
 
+    @property
+    def alive(self) -> bool:
+        """Whether the process can be asked again."""
+        return self._process.poll() is None
+
     def read(self, source: Input, scan: int | None = None) -> NDArray[np.void]:
         """Let the process read the file.
 
