@@ -56,7 +56,7 @@ def check_writable(path: str | Path, *, overwrite: bool) -> None:
         _check_folder(_target(path).parent, place)
     elif stat.S_ISDIR(mode):
         raise OutputError(place, "is a folder", "give a file name")
-    elif not os.access(path, os.W_OK):
+    elif not _is_plain_link(path) and not os.access(path, os.W_OK):
         raise OutputError(place, "is read-only", "choose another name, or change its permissions")
     elif stat.S_ISREG(mode):
         if not overwrite:
@@ -68,7 +68,7 @@ def check_writable(path: str | Path, *, overwrite: bool) -> None:
 def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
     """Open an output under a temporary name and rename it at the end if all went well.
 
-    Symbolic links are followed. Standard output, devices and pipes are written directly. A closed pipe raises
+    A symbolic link is replaced, and the file that it leads to is left alone. Standard output, devices and pipes are written directly. A closed pipe raises
     `BrokenPipeError`, which is not reported as an error.
 
     Parameters
@@ -130,7 +130,7 @@ def moved_at_the_end(name: str, *, overwrite: bool) -> Iterator[str | Path]:
 
     Streams and devices are yielded as they are.
     """
-    if name == STREAM or not (Path(name).is_file() or not Path(name).exists()):
+    if name == STREAM or not (Path(name).is_file() or not Path(name).exists() or _is_plain_link(name)):
         yield name
         return
     check_writable(name, overwrite=overwrite)
@@ -215,11 +215,27 @@ def _staged(target: Path, suffix: str) -> Iterator[Path]:
 
 
 def _target(path: str | Path) -> Path:
+    """Return the name that an output takes: a link gives way to it, and is not followed."""
+    if _is_plain_link(path):
+        return Path(os.path.realpath(Path(path).parent)) / Path(path).name
     return Path(os.path.realpath(path))
 
 
+def _is_plain_link(path: str | Path) -> bool:
+    """Return whether a path is a symbolic link; those of the system, such as `/dev/fd/3`, stand for open files."""
+    try:
+        return Path(path).is_symlink() and Path(path).absolute().parts[1:2] not in (("dev",), ("proc",))
+    except (OSError, ValueError):
+        return False
+
+
 def _mode(path: str | Path) -> int | None:
-    """Return the type and permissions of the file at a path, None if there is no file."""
+    """Return the type and permissions of the file at a path, None if there is no file.
+
+    A link counts as a file, whatever it leads to, unless that is a folder.
+    """
+    if _is_plain_link(path) and not Path(path).is_dir():
+        return stat.S_IFREG | 0o600
     try:
         return Path(path).stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

@@ -183,7 +183,7 @@ class Batch:
         from cylx.io import printable
 
         if outcome.trace:
-            tell(outcome.trace)
+            tell(outcome.trace, lines=True)
         if outcome.status == "failed":
             tell(f"cylx: {outcome.reason}")
         if outcome.finished is None or (len(self.jobs) >= SHORT and not self.run.messages.verbose):

@@ -14,6 +14,7 @@ from types import TracebackType
 import click
 
 from cylx.errors import CylxError, InputError, OutputError
+from cylx.harmless import visible
 
 DEBUG = "cylx.debug"  # key in the context's meta
 BUG, USAGE, UNUSABLE, INTERRUPTED, READER_GONE = 1, 2, 3, 130, 141
@@ -47,7 +48,7 @@ class Failures:
         if failure is None:
             return
         if self.context is not None and self.context.meta.get(DEBUG):
-            tell("".join(traceback.format_exception(failure)).rstrip())
+            tell("".join(traceback.format_exception(failure)).rstrip(), lines=True)
         line, code = describe_failure(failure)
         if line:
             tell(line)
@@ -83,14 +84,31 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     return f"cylx: this is a bug of cylx: {what}; run it again with --debug for the traceback to report", BUG
 
 
-def tell(line: str) -> None:
-    """Print a line on standard error; ignore it if standard error is closed."""
+def tell(text: str, *, lines: bool = False, styled: bool = False) -> None:
+    """Print a line on standard error; ignore it if standard error is closed.
+
+    Parameters
+    ----------
+    text : str
+        Characters that do not print are escaped.
+    lines : bool
+        Whether it may have several lines.
+    styled : bool
+        Whether it has commands for the terminal, and nothing of others that is not escaped already.
+    """
     with contextlib.suppress(OSError):
-        click.echo(line, err=True)
+        click.echo(text if styled else visible(text, keep="\n\t" if lines else ""), err=True)
 
 
-def answer(text: str) -> None:
+def answer(text: str, *, styled: bool = False) -> None:
     """Write the answer, or a part of it, to standard output.
+
+    Parameters
+    ----------
+    text : str
+        Lines; other characters that do not print are escaped.
+    styled : bool
+        Whether it has commands for the terminal, and nothing of others that is not escaped already.
 
     Raises
     ------
@@ -101,6 +119,7 @@ def answer(text: str) -> None:
     """
     if sys.stdout is None:
         raise OutputError("standard output", "is closed", "open it, or write to a file")
+    text = text if styled else visible(text, keep="\n\t")
     encoding = sys.stdout.encoding or "utf-8"
     try:
         click.echo(text.encode(encoding, "backslashreplace").decode(encoding), nl=False)
