@@ -1,4 +1,4 @@
-"""Texts of others (file names, names of properties, results) made harmless where a terminal or a spreadsheet shows them.
+"""Texts of others, such as file names and results, made harmless where a terminal or a spreadsheet shows them.
 
 The only place that does this. Names stay as they are in files that programs read.
 """

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 _CHUNK = 1 << 19  # points read at a time, at the most, ...
 _BUFFER = 1 << 26  # ... and bytes
 _MOST_EQUAL = 1 << 16  # points that may all be the same
+_INFINITE = np.finfo(float).max  # what libE57 makes of 1e999
 _MOST_SCANS = 1 << 16
 _CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 _SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
@@ -188,7 +189,7 @@ def _pose(node: Any, number: int, place: str) -> tuple[NDArray[np.float64], NDAr
             rotation = _rotation(np.array([_number(pose["rotation"][part]) for part in "wxyz"]))
     except Exception:  # noqa: BLE001  nodes of other types fail in ways of their own
         raise InputError(place, f"broken E57: scan {number} has a pose that is none", _REMEDY) from None
-    if not np.isfinite(translation).all() or not np.isfinite(rotation).all():
+    if not (np.abs(translation) < _INFINITE).all() or not np.isfinite(rotation).all():
         raise InputError(place, f"broken E57: scan {number} has a pose that is not finite", _REMEDY)
     return rotation, translation
 
@@ -214,7 +215,11 @@ def _number(node: Any) -> float:  # noqa: ANN401  (of pye57)
     """Return the value of a node that is a number."""
     from pye57 import libe57  # noqa: PLC0415  an extra
 
-    return float(node.scaledValue() if isinstance(node, libe57.ScaledIntegerNode) else node.value())
+    if isinstance(node, libe57.ScaledIntegerNode):
+        return float(node.scaledValue())
+    if not isinstance(node, libe57.FloatNode | libe57.IntegerNode):
+        raise TypeError("no number")
+    return float(node.value())
 
 
 def _bits(node: Any) -> int:  # noqa: ANN401  (of pye57)

@@ -139,13 +139,13 @@ class Reader:
         return self._table(source.place, json.loads(line))
 
     def _send(self, request: object) -> None:
-        assert self._process.stdin is not None  # noqa: S101  it is a pipe
+        assert self._process.stdin is not None
         with suppress(OSError):  # a dead process shows when its answer is read
             self._process.stdin.write(json.dumps(request).encode("ascii") + b"\n")
             self._process.stdin.flush()
 
     def _listen(self) -> None:
-        assert self._process.stdout is not None  # noqa: S101  it is a pipe
+        assert self._process.stdout is not None
         with suppress(OSError, ValueError):
             for line in self._process.stdout:
                 self._answers.put(line)
@@ -187,7 +187,7 @@ class Reader:
 
 @contextmanager
 def _process(fds: list[int]) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a process without our environment's Python settings, with one thread for linear algebra; kill it at the end."""
+    """Start a process that ignores the settings of Python in the environment; kill it at the end."""
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2"}
     command = [os.fsdecode(spawn.get_executable() or sys.executable), "-I", "-S", "-c", _START]
     pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
@@ -252,7 +252,7 @@ def _passed_on(file: IO[bytes]) -> Iterator[tuple[str, int | None]]:
 
 
 def _search_path() -> list[str]:
-    """Return where the process finds its modules: as here, but never in the folder that happens to be the current one."""
+    """Return where the process finds its modules: as here, but never in the current folder."""
     home = str(Path(__file__).resolve().parents[2])
     places = [str(place) for place in sys.path if place]
     return places if home in places else [home, *places]

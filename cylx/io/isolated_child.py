@@ -3,6 +3,7 @@
 It reads one request a line, fills a file with the points, and answers one line. It imports only what the format needs.
 """
 
+# ruff: noqa: PLC0415  (only what the format needs)
 from __future__ import annotations
 
 import ctypes
@@ -122,7 +123,7 @@ def _import_libraries(kind: str) -> None:
 
             import cylx.io.e57
         else:
-            import laspy
+            import laspy  # noqa: F401
             import lazrs  # noqa: F401
 
             import cylx.io.las  # noqa: F401
@@ -186,6 +187,6 @@ def _leave_network(name: str) -> None:
         unshare = ctypes.CDLL(None, use_errno=True).unshare
         if unshare(_NEW_NETWORK) == 0:
             return
-        about = os.stat(name)  # in a user namespace root may open only what is its own
+        about = Path(name).stat()  # in a user namespace root may open only what is its own
         if about.st_uid == os.geteuid() or about.st_mode & 0o004 or os.geteuid() != 0:
             unshare(_NEW_USER | _NEW_NETWORK)

@@ -68,8 +68,8 @@ def check_writable(path: str | Path, *, overwrite: bool) -> None:
 def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
     """Open an output under a temporary name and rename it at the end if all went well.
 
-    A symbolic link is replaced, and the file that it leads to is left alone. Standard output, devices and pipes are written directly. A closed pipe raises
-    `BrokenPipeError`, which is not reported as an error.
+    A symbolic link is replaced, and the file that it leads to is left alone. Standard output, devices and pipes are
+    written directly. A closed pipe raises `BrokenPipeError`, which is not reported as an error.
 
     Parameters
     ----------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from contextlib import ExitStack
 from typing import IO, TYPE_CHECKING
 
@@ -49,7 +48,7 @@ class KeptReaders:
 
     def _start(self, kind: str) -> tuple[Reader, IO[bytes], ExitStack]:
         stack = ExitStack()
-        inbox = stack.enter_context(tempfile.TemporaryFile(dir="/dev/shm" if os.path.isdir("/dev/shm") else None))
+        inbox = stack.enter_context(os.fdopen(os.memfd_create("inbox"), "w+b"))
         reader = stack.enter_context(Reader(kind, inbox))
         self._kept[kind] = (reader, inbox, stack)
         return self._kept[kind]

@@ -80,8 +80,7 @@ def _scans_like(pattern: str) -> list[str]:
 
 
 def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
-    """Yield the files of a folder by name, then those of its subfolders, without hidden files, links to folders, pipes
-    and devices."""
+    """Yield the files of a folder by name, then those of its subfolders, without hidden files and links to folders."""
 
     def refuse(error: OSError) -> NoReturn:
         from cylx.io import printable
