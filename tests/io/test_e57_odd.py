@@ -187,6 +187,22 @@ def test_some_columns_may_be_constant(tmp_path):
     assert ((table["rowIndex"] == 7) & (table["columnIndex"] == 0)).all()
 
 
+def test_damage_with_right_checksums_is_one_line_or_a_cloud(tmp_path, scan):
+    rng = np.random.default_rng(3)
+    logical = np.frombuffer(unpaged(scan.read_bytes()), "u1")
+    for _ in range(200):
+        damaged = logical.copy()
+        places = rng.integers(0, len(damaged), rng.integers(1, 5))
+        damaged[places] = rng.integers(0, 256, len(places))
+        path = tmp_path / "damaged.e57"
+        path.write_bytes(paged(damaged.tobytes()))
+        try:
+            assert 0 < len(read_cloud(path).points) <= N
+        except InputError as refused:
+            assert str(refused).isprintable()
+            assert len(str(refused)) < 400 + len(str(path))
+
+
 @pytest.mark.parametrize("count", [b"9223372036854775807", b"-1", b"101"])
 def test_a_count_that_is_not_held(scan, count):
     edited(scan, lambda xml: xml.replace(b'recordCount="100"', b'recordCount="%s"' % count))

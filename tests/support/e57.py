@@ -21,10 +21,8 @@ def unpaged(data: bytes) -> bytes:
 def paged(logical: bytes) -> bytes:
     """Return pages with their checksums; the last is filled with zeros."""
     pages = np.frombuffer(logical.ljust(-(-len(logical) // _PAYLOAD) * _PAYLOAD, b"\0"), "u1").reshape(-1, _PAYLOAD)
-    crc = np.full(len(pages), 0xFFFFFFFF, "u4")
-    for column in pages.T:
-        crc = _table()[(crc ^ column) & 0xFF] ^ (crc >> 8)
-    return np.hstack([pages, (~crc).astype(">u4").view("u1").reshape(-1, 4)]).tobytes()
+    parts = np.bitwise_xor.reduce(_parts()[np.arange(_PAYLOAD), pages], axis=1) ^ _checksum_of_zeros()
+    return np.hstack([pages, parts.astype(">u4").view("u1").reshape(-1, 4)]).tobytes()
 
 
 def xml_of(data: bytes) -> bytes:
@@ -49,6 +47,24 @@ def edited(path: Path, change: Callable[[bytes], bytes]) -> Path:
     data = path.read_bytes()
     path.write_bytes(with_xml(data, change(xml_of(data))))
     return path
+
+
+@cache
+def _parts() -> np.ndarray:
+    """Return what each byte at each place of a page adds to the checksum."""
+    parts = np.empty((_PAYLOAD, 256), "u4")
+    parts[-1] = _table()
+    for place in range(_PAYLOAD - 2, -1, -1):
+        parts[place] = (parts[place + 1] >> 8) ^ _table()[parts[place + 1] & 0xFF]
+    return parts
+
+
+@cache
+def _checksum_of_zeros() -> int:
+    crc = 0xFFFFFFFF
+    for _ in range(_PAYLOAD):
+        crc = int(_table()[crc & 0xFF]) ^ (crc >> 8)
+    return crc ^ 0xFFFFFFFF
 
 
 @cache
