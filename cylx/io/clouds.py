@@ -137,7 +137,7 @@ def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void],
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
 
         require("pye57", place=source.place, needed_by="", error=InputError, imported=False)
-        return read_isolated(source, "e57", scan), None
+        return read_isolated(source, "e57", scan=scan), None
     if kind == "npy":
         from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone
 

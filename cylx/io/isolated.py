@@ -38,32 +38,37 @@ _START = (
 )
 _SECONDS, _BYTES_A_SECOND = 20, 250_000
 """Processor time that every file may take, and the bytes that are read in each further second, at the least."""
+_TABLE_A_SECOND = 1 << 23
+"""Bytes of points for which a second is added, once their number is known and believed."""
 _MEMORY = 512 << 20
 """Memory beside the points that every file may take; twice the size of the file is added, ..."""
 _MEMORY_A_THREAD = 4 << 20
 """... and this for each thread that decodes."""
+_COPIES = 5
+"""Copies of the body of a PCD that are made while it is unpacked."""
 _LEAST_TABLE, _MOST_EXPANSION = 1 << 30, 100
 """Bytes that the points may always take, and the multiple of the size of the file that they may take beyond."""
 _TYPE = re.compile(r"[<>|][iuf][1248]")
 _LINUX = sys.platform.startswith("linux")
 _REMEDY = "get a complete copy of the file, or convert it to PLY with other software"
-_NAMES = {"las": "LAS", "e57": "E57"}
+_NAMES = {"las": "LAS", "e57": "E57", "pcd": "PCD"}
 
 
-def read_isolated(source: Input, kind: str, scan: int | None = None) -> NDArray[np.void]:
-    """Read all points of a LAS, LAZ or E57 file in a process of its own.
+def read_isolated(source: Input, kind: str, **wanted: int | None) -> NDArray[np.void]:
+    """Read all points of a LAS, LAZ or E57 file, or the compressed body of a PCD, in a process of its own.
 
     Parameters
     ----------
     source : Input
-    kind : {"las", "e57"}
-    scan : int, optional
-        The only scan of an E57 file to read, from 0; by default all.
+    kind : {"las", "e57", "pcd"}
+    **wanted : int or None
+        What the reader needs: `scan`, the only scan of an E57 file to read; `start`, `points` and `width`, the byte at
+        which the body of a PCD begins, the number of its points and their bytes.
 
     Returns
     -------
     ndarray of shape (points,), structured
-        See `read_las` and `read_e57`.
+        See `read_las` and `read_e57`; for PCD the field `byte`, see `unpack_columns`.
 
     Raises
     ------
@@ -71,7 +76,7 @@ def read_isolated(source: Input, kind: str, scan: int | None = None) -> NDArray[
         If the reader refuses the file, dies, or takes more time or memory than a file of this size can need.
     """
     with _readable(source) as file, Reader(kind, file) as reader:
-        return reader.read(source, scan)
+        return reader.read(source, **wanted)
 
 
 class Reader:
@@ -79,7 +84,7 @@ class Reader:
 
     Parameters
     ----------
-    kind : {"las", "e57"}
+    kind : {"las", "e57", "pcd"}
     file : file
         A file with a name, or on Linux any file; its content is read anew for each request.
     """
@@ -111,31 +116,32 @@ class Reader:
         """Whether the process can be asked again."""
         return self._process.poll() is None
 
-    def read(self, source: Input, scan: int | None = None) -> NDArray[np.void]:
+    def read(self, source: Input, **wanted: int | None) -> NDArray[np.void]:
         """Let the process read the file.
 
         Parameters
         ----------
         source : Input
             Names and measures the file.
-        scan : int, optional
+        **wanted : int or None
 
         Raises
         ------
         InputError
             As `read_isolated`. If the process has died or was killed, this object is of no further use.
         """
-        seconds = _SECONDS + source.size // _BYTES_A_SECOND
+        unpacked = (wanted.get("points") or 0) * (wanted.get("width") or 0)
+        seconds = _SECONDS + (source.size + unpacked) // _BYTES_A_SECOND
         most = max(_LEAST_TABLE, _MOST_EXPANSION * source.size)
-        memory = _MEMORY + 2 * source.size + _MEMORY_A_THREAD * (os.cpu_count() or 1)
-        request = {"place": source.place, "scan": scan, "seconds": seconds, "memory": memory, "most": most}
+        memory = _MEMORY + 2 * source.size + _COPIES * unpacked + _MEMORY_A_THREAD * (os.cpu_count() or 1)
+        request = {"place": source.place, "seconds": seconds, "memory": memory, "most": most, "wanted": wanted}
+        request["table_a_second"] = _TABLE_A_SECOND
         self._send(request | {"target": self._target_name})
-        line = self._answer(4 * seconds)
+        line = self._answer(4 * seconds + most // _TABLE_A_SECOND)
         if line is None:
-            fault = f"takes more than {4 * seconds} seconds to read, which is too long for its size"
-            raise InputError(source.place, fault, _REMEDY)
+            raise InputError(source.place, "takes too long to read for a file of its size", _REMEDY)
         if not line.endswith(b"\n"):
-            raise InputError(source.place, self._cause_of_death(seconds), _REMEDY)
+            raise InputError(source.place, self._cause_of_death(), _REMEDY)
         return self._table(source.place, json.loads(line))
 
     def _send(self, request: object) -> None:
@@ -158,11 +164,11 @@ class Reader:
                 return self._answers.get(timeout=1.0)
         return None
 
-    def _cause_of_death(self, seconds: int) -> str:
+    def _cause_of_death(self) -> str:
         code = self._process.wait()
         name = _NAMES[self.kind]
         if code == -getattr(signal, "SIGXCPU", 0):
-            return f"takes more than {seconds} seconds to read, which is too long for its size"
+            return "takes too long to read for a file of its size"
         if code == -getattr(signal, "SIGKILL", 0):
             return f"the process that reads the {name} was killed, perhaps for want of memory"
         cause = signal.Signals(-code).name if code < 0 and -code in set(signal.Signals) else f"exit code {code}"

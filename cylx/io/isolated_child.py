@@ -13,6 +13,7 @@ import os
 import signal
 import sys
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -20,6 +21,11 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+_LIBRARIES = {
+    "las": ("laspy", "lazrs", "cylx.io.las"),
+    "e57": ("pye57", "cylx.io.e57"),
+    "pcd": ("cylx.io.pcd",),
+}
 _NEW_USER, _NEW_NETWORK = 0x10000000, 0x40000000  # of unshare(2)
 _DIE_WITH_PARENT = 1  # of prctl(2)
 
@@ -29,7 +35,7 @@ def serve(kind: str, parent: int, request_name: str) -> None:
 
     Parameters
     ----------
-    kind : {"las", "e57"}
+    kind : {"las", "e57", "pcd"}
         The format of all files.
     parent : int
         Id of the process that asks.
@@ -56,10 +62,13 @@ class Target:
         A file that exists.
     most : int
         Largest size in bytes.
+    rate : int
+        Bytes for which a second is added to the time allowed.
     """
 
-    def __init__(self, name: str, most: int) -> None:
+    def __init__(self, name: str, most: int, rate: int) -> None:
         self.name = name
+        self.rate = rate
         self.most = most
         self.table: NDArray[np.void] | None = None
 
@@ -76,7 +85,7 @@ class Target:
         size = count * dtype.itemsize
         if size > self.most:
             raise MemoryError
-        _allow_memory(size)
+        _allow_table(size, self.rate)
         with Path(self.name).open("r+b") as file:
             file.truncate(0)
             file.truncate(size)
@@ -89,7 +98,7 @@ def _answer(kind: str, request: dict[str, Any], name: str) -> dict[str, Any]:
     from cylx.errors import InputError
 
     _limit(request["seconds"], request["memory"])
-    target = Target(request["target"], request["most"])
+    target = Target(request["target"], request["most"], request["table_a_second"])
     try:
         with Path(name).open("rb") as file:
             table = _read(kind, file, request, target)
@@ -109,7 +118,11 @@ def _read(kind: str, file: BinaryIO, request: dict[str, Any], target: Target) ->
     if kind == "e57":
         from cylx.io.e57 import read_e57
 
-        return read_e57(source, request["scan"], allocate=target)
+        return read_e57(source, allocate=target, **request["wanted"])
+    if kind == "pcd":
+        from cylx.io.pcd import unpack_body
+
+        return unpack_body(source, allocate=target, **request["wanted"])
     from cylx.io.las import read_las
 
     return read_las(source, allocate=target)
@@ -118,15 +131,13 @@ def _read(kind: str, file: BinaryIO, request: dict[str, Any], target: Target) ->
 def _import_libraries(kind: str) -> None:
     """Import everything before the limits count, and before anything of the file is read."""
     with suppress(ImportError):  # the reader says it
-        if kind == "e57":
-            import pye57  # noqa: F401
+        for name in _LIBRARIES[kind]:
+            import_module(name)
+    if kind == "pcd":
+        from cylx.optional.open3d import import_open3d
 
-            import cylx.io.e57
-        else:
-            import laspy  # noqa: F401
-            import lazrs  # noqa: F401
-
-            import cylx.io.las  # noqa: F401
+        with suppress(ImportError):
+            import_open3d()
 
 
 def _limit(seconds: int, memory: int) -> None:
@@ -135,23 +146,26 @@ def _limit(seconds: int, memory: int) -> None:
         import resource
 
         usage = resource.getrusage(resource.RUSAGE_SELF)
-        _lower(resource.RLIMIT_CPU, int(usage.ru_utime + usage.ru_stime) + seconds)
+        _set(resource.RLIMIT_CPU, int(usage.ru_utime + usage.ru_stime) + seconds)
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
         if (held := _held()) is not None:
-            _lower(resource.RLIMIT_AS, held + memory)
+            _set(resource.RLIMIT_AS, held + memory)
 
 
-def _allow_memory(size: int) -> None:
-    """Raise the limit of memory by the size of the table."""
+def _allow_table(size: int, rate: int) -> None:
+    """Raise the limits of time and memory by what the table needs."""
     with suppress(ImportError):
         import resource
 
+        soft, _ = resource.getrlimit(resource.RLIMIT_CPU)
+        if soft != resource.RLIM_INFINITY:
+            _set(resource.RLIMIT_CPU, soft + size // rate)
         soft, _ = resource.getrlimit(resource.RLIMIT_AS)
         if _held() is not None and soft != resource.RLIM_INFINITY:
-            _lower(resource.RLIMIT_AS, soft + size)
+            _set(resource.RLIMIT_AS, soft + size)
 
 
-def _lower(limit: int, value: int) -> None:
+def _set(limit: int, value: int) -> None:
     """Set a limit, as far as that of the parent allows it."""
     import resource
 

@@ -1,7 +1,8 @@
 """PCD: all fields of all points, in the order of the file.
 
 The header and the bodies `ascii` and `binary` are read here and not by open3d, which reads words as zeros, invents
-points that a short body lacks, and drops fields that it does not use. open3d unpacks `binary_compressed`.
+points that a short body lacks, and drops fields that it does not use. open3d unpacks
+`binary_compressed`, in a process of its own.
 """
 
 from __future__ import annotations
@@ -15,10 +16,15 @@ from cylx.errors import InputError
 from cylx.io.inputs import Input, excerpt
 from cylx.io.names import coordinate_names, mended_names, missing_coordinates
 from cylx.io.rows import RowFormat, read_rows, short_of_points
+from cylx.optional.extras import is_found
 from cylx.optional.open3d import unpack_columns
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
+
+    Allocate = Callable[[int, np.dtype[np.void]], NDArray[np.void]]
 
 _TYPES = {
     **{("F", size): f"<f{size}" for size in (4, 8)},
@@ -169,26 +175,66 @@ def _read_text(header: _Header, source: Input) -> NDArray[np.void]:
 
 def _read_packed(header: _Header, source: Input) -> NDArray[np.void]:
     source.file.seek(header.size)
-    body = source.file.read()
-    sizes = np.frombuffer(body[:8].ljust(8, b"\0"), "<u4").tolist()
-    if len(body) < 8 or sizes[0] > len(body) - 8:
+    held = source.size - header.size - 8
+    sizes = np.frombuffer(source.file.read(8).ljust(8, b"\0"), "<u4").tolist()
+    if held < 0 or sizes[0] > held:
         raise InputError(source.place, "the file ends within the compressed body", "get a complete copy of the file")
     if sizes[1] != header.points * header.width or sizes[1] > _MOST_EXPANSION * sizes[0]:
         fault = f"the body does not hold the {header.points} points that the header promises"
         raise InputError(source.place, fault, "get a complete copy of the file")
-    try:
-        flat = unpack_columns(body, header.points, header.width)
-    except ImportError:
-        remedy = "install open3d, or save the file as DATA binary"
-        raise InputError(source.place, "DATA binary_compressed needs open3d", remedy) from None
-    if flat is None:
-        raise InputError(source.place, "the compressed body is damaged", "get a complete copy of the file")
+    from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
+
+    if not is_found("open3d"):
+        raise _without_open3d(source)
+    flat = read_isolated(source, "pcd", start=header.size, points=header.points, width=header.width)["byte"]
     columns = header.columns()
     table = np.empty(header.points, np.dtype([(name, kind) for name, kind, _, _ in columns]))
     for name, kind, field, place in columns:
         start, width = header.points * field.offset, header.points * field.width
         table[name] = flat[start : start + width].view(kind).reshape(header.points, field.count)[:, place]
     return table
+
+
+def unpack_body(source: Input, start: int, points: int, width: int, *, allocate: Allocate) -> NDArray[np.void]:
+    """Unpack a compressed body, whose sizes were checked; open3d does it, in the process that is made for it.
+
+    Parameters
+    ----------
+    source : Input
+    start : int
+        Byte at which the body begins.
+    points : int
+        Number of points.
+    width : int
+        Bytes per point.
+    allocate : callable
+        Makes the table of a number of bytes and a type.
+
+    Returns
+    -------
+    ndarray of shape (points * width,), structured
+        The field `byte`, see `unpack_columns`.
+
+    Raises
+    ------
+    InputError
+        If the body is damaged, or open3d does not run here.
+    """
+    source.file.seek(start)
+    try:
+        flat = unpack_columns(source.file.read(), points, width)
+    except ImportError:
+        raise _without_open3d(source) from None
+    if flat is None:
+        raise InputError(source.place, "the compressed body is damaged", "get a complete copy of the file")
+    table = allocate(len(flat), np.dtype([("byte", "u1")]))
+    table["byte"] = flat
+    return table
+
+
+def _without_open3d(source: Input) -> InputError:
+    remedy = "install open3d, or save the file as DATA binary"
+    return InputError(source.place, "DATA binary_compressed needs open3d", remedy)
 
 
 def _read_header(source: Input) -> _Header:

@@ -65,7 +65,7 @@ def require(
     CylxError
         If one of them cannot be imported.
     """
-    missing = [name for name in libraries if not (_is_there(name) if imported else _is_found(name))]
+    missing = [name for name in libraries if not (_is_there(name) if imported else is_found(name))]
     if not missing:
         return
     fault = f"{'is' if len(missing) == 1 else 'are'} not installed"
@@ -82,7 +82,8 @@ def _is_there(library: str) -> bool:
     return True
 
 
-def _is_found(library: str) -> bool:
+def is_found(library: str) -> bool:
+    """Return whether a library is installed, without importing it."""
     try:
         return find_spec(library) is not None
     except (ImportError, ValueError):

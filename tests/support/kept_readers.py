@@ -21,12 +21,12 @@ class KeptReaders:
         self.deaths = 0
         self._kept: dict[str, tuple[Reader, IO[bytes], ExitStack]] = {}
 
-    def read_isolated(self, source: Input, kind: str, scan: int | None = None) -> np.ndarray:
+    def read_isolated(self, source: Input, kind: str, **wanted: int | None) -> np.ndarray:
         """Stand in for `cylx.io.isolated.read_isolated`."""
         source.file.seek(0)
-        return self.read_bytes(source.file.read(), kind, scan, source.place)
+        return self.read_bytes(source.file.read(), kind, source.place, **wanted)
 
-    def read_bytes(self, data: bytes, kind: str, scan: int | None = None, place: str = "scan") -> np.ndarray:
+    def read_bytes(self, data: bytes, kind: str, place: str = "scan", **wanted: int | None) -> np.ndarray:
         """Read the content of a file."""
         reader, inbox, _ = self._kept.get(kind) or self._start(kind)
         inbox.seek(0)
@@ -34,9 +34,9 @@ class KeptReaders:
         inbox.write(data)
         inbox.flush()
         try:
-            return reader.read(Input(place, inbox, len(data), ""), scan).copy()
+            return reader.read(Input(place, inbox, len(data), ""), **wanted).copy()
         except InputError as error:
-            if not reader.alive or "seconds" in error.fault or "crashed" in error.fault or "killed" in error.fault:
+            if not reader.alive or "too long" in error.fault or "crashed" in error.fault or "killed" in error.fault:
                 self.deaths += 1
                 self._stop(kind)
             raise
