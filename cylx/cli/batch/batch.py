@@ -15,7 +15,7 @@ import click
 from cylx.cli.batch.found import found_line
 from cylx.cli.batch.memory import cores, memory_needed
 from cylx.cli.batch.outcomes import Finished, Outcome, check_required, entry_of, failed_outcome, lost_outcome
-from cylx.cli.batch.resume import check_own, finished_before, is_own_json
+from cylx.cli.batch.resume import check_own, finished_before, is_own_json, written_by
 from cylx.cli.batch.run import attempt
 from cylx.cli.batch.summary import LIST, is_own_table, list_text, table_text
 from cylx.cli.terminal.display import Messages, show_table
@@ -206,13 +206,13 @@ class Batch:
 
     def _sum_up(self) -> None:
         """Write the table of all cylinders and the list of all scans."""
-        from cylx.io import read_json, write_text
+        from cylx.io import write_text
 
         if not self.summaries:
             return
         table, listed = self.summaries
         there = [(job, self.outcomes[index]) for index, job in enumerate(self.jobs)]
-        results = [(job.scan, read_json(job.result)) for job, outcome in there if outcome.finished is not None]
+        results = [(job.scan, written) for job, outcome in there if outcome.finished and (written := written_by(job))]
         write_text(table, table_text(results), overwrite=True)
         write_text(listed, list_text([entry_of(job, outcome) for job, outcome in there]), overwrite=True)
 
