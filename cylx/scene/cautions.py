@@ -87,7 +87,8 @@ def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
     points = cloud.points[:: max(1, len(cloud.points) // COORDINATES_SAMPLED)]
     steps = [step_of(points[:, d]) for d in range(3)]
     coarse = _coarse(points, steps, scene)
-    found = [coarse, None if coarse else _copies(cloud.points, min(steps), scene), _noisy(scene)]
+    read = [Caution("columns", fault, remedy) for fault, remedy in cloud.source.doubts]
+    found = [*read, coarse, None if coarse else _copies(cloud.points, min(steps), scene), _noisy(scene)]
     return [caution for caution in found if caution is not None]
 
 

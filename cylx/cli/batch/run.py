@@ -78,7 +78,10 @@ class Run:
         report(self.messages, job, extraction)
         for remark in remarks:
             self.messages.say(f"warning: {remark}")
-        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()))
+        notes = cloud.source.notes
+        for note in notes:
+            self.messages.say(f"note: {note}")
+        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()), notes)
 
 
 def attempt(run: Run, debug: bool, job: Job) -> Outcome:
