@@ -128,7 +128,8 @@ def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void],
         from cylx.io.las import read_las  # noqa: PLC0415  needs an extra, or for this alone
         from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  needs an extra, or for this alone
 
-        return read_las(source), {"header": kept_header(source, las_header(source))}
+        facts = las_header(source)
+        return read_las(source), {"header": kept_header(source, facts), "doubts": facts.doubts}
     if kind == "e57":
         from cylx.io.e57 import read_e57  # noqa: PLC0415  needs an extra, or for this alone
 

@@ -121,9 +121,9 @@ def printable(path: str | Path) -> str:
     return text if (text := str(path)).isprintable() else repr(text)
 
 
-def excerpt(text: str) -> str:
+def excerpt(text: str, most: int = 40) -> str:
     """Quote a piece of a file so that it fits on one line of a message."""
-    return ascii(text if len(text) <= 40 else text[:37] + "...")
+    return ascii(text if len(text) <= most else text[: most - 3] + "...")
 
 
 def _open(path: str | Path, place: str) -> AbstractContextManager[BinaryIO]:

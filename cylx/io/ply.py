@@ -105,9 +105,30 @@ def _read_with_plyfile(header: Header, source: Input) -> NDArray[np.void]:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")  # about an empty list
             warnings.simplefilter("error", DeprecationWarning)  # numpy 1 reads 300 as the uchar 44
-            return np.asarray(PlyData.read(stream)["vertex"].data)
+            return _with_long_integers(np.asarray(PlyData.read(stream)["vertex"].data), header)
     except (PlyParseError, ValueError, OverflowError, DeprecationWarning) as error:
         raise InputError(source.place, f"broken PLY: {error}", "get a complete copy of the file") from None
+
+
+def _with_long_integers(table: NDArray[np.void], header: Header) -> NDArray[np.void]:
+    """Give integers of 8 bytes, which plyfile took for doubles, their type."""
+    kinds = [TYPES[item.type] for item in header.vertex.properties]
+    long = [name for name, kind in zip(table.dtype.names or (), kinds, strict=True) if kind in ("i8", "u8")]
+    if not long:
+        return table
+    types = dict(zip(table.dtype.names or (), kinds, strict=True))
+    fields = [
+        (name, table.dtype[name].str[0] + types[name] if name in long else table.dtype[name])
+        for name in table.dtype.names or ()
+    ]
+    out = np.empty(len(table), np.dtype(fields))
+    for name in table.dtype.names or ():
+        column = table[name]
+        if name in long and not header.text:
+            column = np.ascontiguousarray(column).view(out.dtype[name])
+        with np.errstate(all="ignore"):
+            out[name] = column
+    return out
 
 
 class _Spliced:

@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
-import csv
 import io
-import re
 import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.inputs import Input, excerpt
+from cylx.io.cells import (
+    COMMENTS,
+    DECIMAL_COMMA,
+    SHARP,
+    all_cells,
+    check_number,
+    is_count,
+    plain_number,
+    split_row,
+    uncommented,
+)
+from cylx.io.inputs import Input
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
-COMMENTS = ("#", "//")
 LONGEST_LINE = 1 << 20
 """Letters of a line: more than any table of points has."""
-_DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?", re.ASCII)
-_NOT_A_NUMBER = re.compile(r"[-+]?(nan\(\w*\)|1\.#(IND|QNAN|SNAN|INF|R)0*)", re.IGNORECASE)
-"""How Windows wrote NaN and infinity …"""
-_SHARP = "1.#"
-"""… and what begins no comment therefore."""
 _BLOCK = 1 << 20
-_MOST_DIGITS = 18
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,85 +138,6 @@ def text_lines(source: Input, offset: int = 0, encoding: str = "utf-8-sig") -> I
         lines.detach()
 
 
-def uncommented(line: str) -> str:
-    """Remove a comment from a line, and white space from both ends.
-
-    Examples
-    --------
-    >>> uncommented(" 1 2 3  // the corner")
-    '1 2 3'
-    """
-    if _SHARP in line:
-        line = _NOT_A_NUMBER.sub("nan", line)
-    for mark in COMMENTS:
-        line = line.partition(mark)[0]
-    return line.strip()
-
-
-def split_row(line: str, delimiter: str | None) -> list[str]:
-    """Split a row into its columns; a delimiter at the end adds no column, and one in quotes separates none.
-
-    Examples
-    --------
-    >>> split_row("1; 2;3;", ";")
-    ['1', '2', '3']
-    >>> split_row('1,"wall, outer",3', ",")
-    ['1', 'wall, outer', '3']
-    """
-    columns = _all_columns(line, delimiter)
-    return columns[:-1] if columns and columns[-1] == "" else columns
-
-
-def is_count(text: str) -> bool:
-    """Return whether a text is a number of rows."""
-    return text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS
-
-
-def plain_number(text: str) -> str:
-    """Return a number with a point for a comma, and with the NaN of Windows as others write it.
-
-    Examples
-    --------
-    >>> plain_number("1,5"), plain_number("-nan(ind)"), plain_number("1.5")
-    ('1.5', 'nan', '1.5')
-    """
-    if _DECIMAL_COMMA.fullmatch(text):
-        return text.replace(",", ".")
-    return "nan" if _NOT_A_NUMBER.fullmatch(text) else text
-
-
-def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
-    """Return whether a text is a number that fits a type.
-
-    Examples
-    --------
-    >>> is_number("-1.5e3"), is_number("1_000"), is_number("256", np.dtype("u1"))
-    (True, False, False)
-    """
-    if "_" in text or not text.isascii():
-        return False
-    try:
-        if dtype is None or dtype.kind == "f":
-            float(text)
-            return True
-        limits = np.iinfo(dtype)
-        return limits.min <= int(text) <= limits.max
-    except ValueError:
-        return False
-
-
-def _all_columns(line: str, delimiter: str | None) -> list[str]:
-    if '"' in line:
-        if delimiter is None:
-            return [quoted or plain for quoted, plain in re.findall(r'"([^"]*)"|(\S+)', line)]
-        try:
-            (row,) = csv.reader([line], delimiter=delimiter, skipinitialspace=True)
-        except csv.Error:
-            row = line.split(delimiter)
-        return [column.strip() for column in row]
-    return line.split() if delimiter is None else [column.strip() for column in line.split(delimiter)]
-
-
 def _read_fast(source: Input, rows: RowFormat, most: int | None) -> NDArray[np.void]:
     """Read rows by numpy alone.
 
@@ -234,7 +157,7 @@ def _read_fast(source: Input, rows: RowFormat, most: int | None) -> NDArray[np.v
 
 def _is_sharp(source: Input, rows: RowFormat) -> bool:
     """Return whether a `#` of the text belongs to a number."""
-    mark = _SHARP.encode(rows.encoding if rows.encoding.endswith(("le", "be")) else "utf-8")
+    mark = SHARP.encode(rows.encoding if rows.encoding.endswith(("le", "be")) else "utf-8")
     if rows.encoding in ("utf-16", "utf-32"):
         return True  # numpy is no faster there that it would pay
     source.file.seek(rows.offset)
@@ -301,7 +224,7 @@ def _row_of(line: str, rows: RowFormat) -> list[str]:
     """Return the columns of a line, without its comment; a mark within a name begins none."""
     row = uncommented(line) if rows.commented else line.strip()
     for text in (row,) if rows.kept is None else dict.fromkeys((row, line.strip())):
-        columns = _all_columns(text, rows.delimiter)
+        columns = all_cells(text, rows.delimiter)
         if columns and columns[-1] == "" and len(columns) != rows.width:
             columns.pop()
         if len(columns) == rows.width and row:
@@ -317,7 +240,7 @@ def _one_mark(before: str, values: Iterable[str], where: str) -> str:
     InputError
         If a row has a comma for a decimal mark, and another row or value a point.
     """
-    marks = {"," if "," in value else "." for value in values if _DECIMAL_COMMA.fullmatch(value) or "." in value}
+    marks = {"," if "," in value else "." for value in values if DECIMAL_COMMA.fullmatch(value) or "." in value}
     if len(marks | set(before)) > 1:
         raise InputError(where, "some numbers have a decimal comma, others a point", "write all of them with a point")
     return before or "".join(marks)
@@ -335,20 +258,6 @@ def _filled(values: list[str], rows: RowFormat, where: str) -> list[str]:
         check_number(where, name, value, rows.dtype[name])
         out.append(value)
     return out
-
-
-def check_number(where: str, name: str, column: str, dtype: np.dtype[Any] | None = None) -> None:
-    """Refuse a column that is not a number.
-
-    Raises
-    ------
-    InputError
-        If it is not a number.
-    """
-    if not is_number(column, dtype):
-        kind = "a number" if dtype is None or dtype.kind == "f" else f"a number of type {dtype.name}"
-        fault = f"{name} is {excerpt(column)}, not {kind}" if column else f"{name} is empty"
-        raise InputError(where, fault, "write numbers like -1.5 or 2e-3")
 
 
 def _most_rows(source: Input, rows: RowFormat) -> int | None:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from cylx.errors import InputError
+from cylx.io.cells import is_number, plain_number
 from cylx.io.columns import Coordinates, is_other, named_axes, named_coordinates
 from cylx.io.inputs import excerpt
 from cylx.io.names import mended_names
-from cylx.io.rows import is_number, plain_number
 from cylx.io.text_top import Top, names_of, words_of
 
 _RENAME = "name the columns x, y and z"

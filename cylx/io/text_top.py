@@ -7,10 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cylx.errors import InputError
-from cylx.io.columns import named_coordinates
-from cylx.io.rows import (
+from cylx.io.cells import (
     COMMENTS,
-    LONGEST_LINE,
     check_number,
     is_count,
     is_number,
@@ -18,6 +16,8 @@ from cylx.io.rows import (
     split_row,
     uncommented,
 )
+from cylx.io.columns import named_coordinates
+from cylx.io.rows import LONGEST_LINE
 
 if TYPE_CHECKING:
     import io
