@@ -121,7 +121,8 @@ def read_cylinders(document: Mapping[str, object], place: str, key: str = "cylin
                 numbers[row, i] = _number(entry[name], f"{here}.{name}")
         ids.append(_identity(entry.get("id", i), f"{here}.id"))
         ignore[i] = bool(entry.get("ignore", False))
-    lengths = np.linalg.norm(vectors[1], axis=1, keepdims=True)
+    with np.errstate(over="ignore", invalid="ignore"):  # a direction that is too long is unusable
+        lengths = np.linalg.norm(vectors[1], axis=1, keepdims=True)
     directions = np.divide(vectors[1], lengths, out=np.full((n, 3), np.nan), where=np.isfinite(lengths) & (lengths > 0))
     return CylinderTable(tuple(ids), vectors[0], directions, numbers[0], numbers[1], numbers[2], ignore)
 

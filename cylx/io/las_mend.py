@@ -6,6 +6,7 @@ A mended header has the length of the original, so that all positions in the fil
 from __future__ import annotations
 
 import io
+import math
 import struct
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO, NamedTuple
@@ -26,6 +27,8 @@ _WIDTHS = (1, 1, 2, 2, 4, 4, 8, 8, 4, 8)
 """Bytes of the types of extra bytes, from 1 on; further ones are two or three of these."""
 _POINT = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)
 """Bytes of the point formats."""
+_SCALED = 8 | 16
+"""The bits that say that a dimension has a scale, and an offset."""
 _UNUSED = b"cylx_unused"
 
 
@@ -259,8 +262,17 @@ def _mended_dimensions(data: bytes, head: bytes) -> bytes | None:
         if new != bytes(about[_NAME]).rstrip(b"\0"):
             about[_NAME] = new.ljust(32, b"\0")
         about[_ABOUT] = _ascii(about[_ABOUT])
+        about[3] &= 0xFF if about[2] == 0 or _is_scaled(about) else ~_SCALED & 0xFF
         out[start : start + _STRUCT] = about
     return bytes(out)
+
+
+def _is_scaled(about: bytearray) -> bool:
+    """Return whether the scales and offsets of a dimension can be used, or there are none."""
+    scales, offsets = (struct.unpack_from("<3d", about, place) for place in (112, 136))
+    count = (about[2] - 1) // 10 + 1
+    used = (scales[:count] if about[3] & 8 else ()) + (offsets[:count] if about[3] & 16 else ())
+    return all(map(math.isfinite, used)) and not (about[3] & 8 and 0.0 in scales[:count])
 
 
 def _size_of(kind: int, options: int) -> int:

@@ -64,7 +64,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
     from plyfile import PlyData, PlyElement  # noqa: PLC0415  slow to import
 
     def document(rows: NDArray[np.void]) -> PlyData:
-        lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
+        lists = [name for name in rows.dtype.names or () if rows.dtype[name].kind == "O"]
         types = {name: np.asarray(rows[name][0]).dtype.str[1:] for name in lists if len(rows)}
         element = PlyElement.describe(rows, "vertex", len_types=dict.fromkeys(lists, "u4"), val_types=types)
         return PlyData([element], byte_order="<")
@@ -73,9 +73,21 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
     first = next(pieces, np.empty(0, dtype))
     file.write(document(np.broadcast_to(first[:1], count)).header.encode() + b"\n")
     for block in chain([first], pieces):
-        part, body = document(block), io.BytesIO()
+        if not any(dtype[name].kind == "O" for name in dtype.names or ()):
+            file.write(block.tobytes())
+            continue
+        part, body = document(_renamed(block)), io.BytesIO()
         part.write(body)
         file.write(body.getbuffer()[len(part.header) + 1 :])
+
+
+def _renamed(rows: NDArray[np.void]) -> NDArray[np.void]:
+    """Return rows with other names: plyfile cannot write the values of one that has a colon."""
+    names = rows.dtype.names or ()
+    out = np.empty(len(rows), np.dtype([(f"p{place}", rows.dtype[name]) for place, name in enumerate(names)]))
+    for place, name in enumerate(names):
+        out[f"p{place}"] = rows[name]
+    return out
 
 
 def ply_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
