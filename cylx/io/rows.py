@@ -256,7 +256,7 @@ def _filled(values: list[str], rows: RowFormat, where: str) -> list[str]:
             out.append("nan")
             continue
         check_number(where, name, value, rows.dtype[name])
-        out.append(value)
+        out.append(str(int(value)) if rows.dtype[name].kind in "iu" else value)  # numpy refuses -0 and +1
     return out
 
 

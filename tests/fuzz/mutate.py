@@ -7,17 +7,19 @@ NUMBERS = re.compile(rb"-?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?")
 ODD_NUMBERS = (
     b"0", b"-0", b"-1", b"1", b"2", b"3", b"255", b"256", b"65535", b"65536", b"2147483647", b"2147483648",
     b"4294967295", b"4294967296", b"9223372036854775807", b"9223372036854775808", b"18446744073709551616", b"1e308",
-    b"1e309", b"-1e309", b"1e999", b"1e-400", b"nan", b"inf", b"-inf", b"NaN", b"1.#QNAN", b"-nan(ind)", b"1,5", b"1.5.5",
-    b"0x10", b"1_000", b"1e", b".", b"-", b"+", b"\xef\xbc\x91", b"True", b"None", b"", b"9" * 31, b"9" * 400, b"9" * 5000,
+    b"1e309", b"-1e309", b"1e999", b"1e-400", b"nan", b"inf", b"-inf", b"NaN", b"1.#QNAN", b"-nan(ind)", b"1,5",
+    b"1.5.5", b"0x10", b"1_000", b"1e", b".", b"-", b"+", b"\xef\xbc\x91", b"True", b"None", b"", b"9" * 31,
+    b"9" * 400, b"9" * 5000,
 )  # fmt: skip
 ODD_INTEGERS = (0, 1, 2, 3, 4, 7, 8, 127, 128, 255, 256, 32767, 65535, 65536, (1 << 31) - 1, 1 << 31, (1 << 32) - 1)
 ODD_DOUBLES = (0.0, -0.0, 1e-320, 1e300, -1e300, float("inf"), float("nan"), 1.0, -1.0)
 WORDS = (
-    b"#", b"//", b"\"", b"'", b",", b";", b"\t", b"|", b":", b"\r", b"\r\n", b"\n\n", b"\0", b"\xff\xfe", b"\xef\xbb\xbf",
-    b"x", b"y", b"z", b"X", b"Points:0", b"Easting", b"Northing", b"Elevation", b"id", b"_", b"nan", b"null", b"true",
-    b"{", b"}", b"[", b"]", b"&a", b"*a", b"!!python/object", b"\\U", b"\\UFFFFFFFF", b"\\ud800", b"\\x00", b"%", b"---",
-    b"list", b"property", b"element", b"end_header", b"COUNT", b"DATA ascii", b"DATA binary", b"FIELDS x y z", b"[m]",
-    b"(m)", b"\xc3\xa4", b"\xe4", b"\xf0\x9f\x98\x80", b"\x1b[31m", b"=1+1", b"__class__", b"'|O'", b"'<f8'", b"(3,)",
+    b"#", b"//", b"\"", b"'", b",", b";", b"\t", b"|", b":", b"\r", b"\r\n", b"\n\n", b"\0", b"\xff\xfe",
+    b"\xef\xbb\xbf", b"x", b"y", b"z", b"X", b"Points:0", b"Easting", b"Northing", b"Elevation", b"id", b"_",
+    b"nan", b"null", b"true", b"{", b"}", b"[", b"]", b"&a", b"*a", b"!!python/object", b"\\U", b"\\UFFFFFFFF",
+    b"\\ud800", b"\\x00", b"%", b"---", b"list", b"property", b"element", b"end_header", b"COUNT", b"DATA ascii",
+    b"DATA binary", b"FIELDS x y z", b"[m]", b"(m)", b"\xc3\xa4", b"\xe4", b"\xf0\x9f\x98\x80", b"\x1b[31m",
+    b"=1+1", b"__class__", b"'|O'", b"'<f8'", b"(3,)",
 )  # fmt: skip
 
 

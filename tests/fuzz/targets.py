@@ -3,13 +3,12 @@
 import json
 import os
 import tempfile
-import warnings
 from pathlib import Path
 
 import click
 
 SEEDS = Path(__file__).parent / "seeds"
-_MEMORY = Path("/dev/shm")  # noqa: S108
+_MEMORY = Path("/dev/shm")
 _SUFFIXES = {
     "xyz": ".xyz", "csv": ".csv", "pts": ".pts", "ply": ".ply", "pcd": ".pcd", "npy": ".npy", "npz": ".npz",
     "las": ".las", "guessed": "",
@@ -57,40 +56,24 @@ def check_cloud(cloud):
         raise AssertionError("two properties of one name")
 
 
-def annotate_las(data):
-    """Read a LAS file and write it again: what cannot be written is known before."""
-    import io
+def annotate(read, suffix):
+    """Return a function that reads a scan and writes its annotated cloud: what cannot be written is known before."""
 
-    from cylx.errors import OutputError
-    from cylx.io.annotated import _findings, las_obstacle
-    from cylx.io.las_annotated import write_las
+    def write(data):
+        from cylx.errors import OutputError
+        from cylx.io import check_annotated, write_annotated
 
-    cloud = read_scan(".las")(data)
-    if cloud.rows > 1000 or cloud.table.dtype.itemsize > 2000:
-        return
-    obstacle = las_obstacle("out.las", cloud)
-    if obstacle:
-        raise OutputError("out.las", obstacle, "choose a name that ends in .ply")
-    write_las(io.BytesIO(), cloud.source.header, cloud.table, _findings(_extraction(cloud)), compressed=False)
+        cloud = read(data)
+        if cloud.rows > 1000 or (cloud.table is not None and cloud.table.dtype.itemsize > 2000):
+            return
+        path = Path(SCRATCH.folder.name) / f"annotated{suffix}"
+        check_annotated(path, cloud)
+        try:
+            write_annotated(path, _extraction(cloud), overwrite=True)
+        except OutputError as error:
+            raise AssertionError(f"refused late: {error}") from error
 
-
-def annotate_ply(data):
-    """Read a PLY or text file and write its annotated cloud."""
-    import io
-
-    from cylx.io.annotated import _blocks, _kept
-    from cylx.io.annotated import _OURS as OURS
-    from cylx.io.ply import write_ply
-
-    import numpy as np
-
-    cloud = read_scan("")(data)
-    if cloud.rows > 1000:
-        return
-    kept = _kept(cloud)
-    dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *OURS.items()])
-    with np.errstate(all="ignore"):
-        write_ply(io.BytesIO(), dtype, cloud.rows, _blocks(_extraction(cloud), kept, dtype))
+    return write
 
 
 def _extraction(cloud):
@@ -160,21 +143,22 @@ def use_option(data):
     from cylx.errors import UsageError
 
     name, _, value = data.decode("utf-8", "replace").partition("\n")
-    name = name if name in OPTIONS else sorted(OPTIONS)[len(value) % len(OPTIONS)]
-    outcome = CliRunner().invoke(main, [OPTIONS[name], str(Path(SCRATCH.folder.name) / "none.ply"), f"{name}={value}"])
+    name = name if name in OPTIONS else OPTIONS[len(value) % len(OPTIONS)]
+    scan = str(Path(SCRATCH.folder.name) / "none.ply")
+    outcome = CliRunner().invoke(main, ["extract", scan, f"{name}={value}"])
     if isinstance(outcome.exception, SystemExit | click.exceptions.Exit) and outcome.exit_code in (2, 3):
         lines = outcome.output.strip().splitlines()
         raise UsageError("option", " ".join(lines) if len(lines) < 2 else "several lines\n", "correct it")
     raise AssertionError(f"exit code {outcome.exit_code}: {outcome.output[:300]!r} {outcome.exception!r}")
 
 
-OPTIONS = {
-    **dict.fromkeys(
-        ("--radius", "--known-radius", "--axis", "--axis-tolerance", "--axis-sd", "--min-coverage", "--set", "--crop",
-         "--voxel", "--every", "--classes", "--scan", "--threads", "--preset", "--seed", "--require", "--max-cylinders"),
-        "extract",
-    ),
-}  # fmt: skip
+OPTIONS = (
+    "--radius", "--known-radius", "--axis", "--axis-tolerance", "--axis-sd", "--min-coverage", "--set", "--crop",
+    "--voxel", "--every", "--classes", "--scan", "--threads", "--preset", "--seed", "--require", "--max-cylinders",
+)  # fmt: skip
+
+
+SHARED = {"las-annotated": "las", "compare": "result", "csv": "text", "xyz": "text", "pts": "text"}
 
 
 def seeds_of(name):
@@ -189,8 +173,8 @@ def seeds_of(name):
 
 FUNCTIONS = {
     **{name: read_scan(suffix) for name, suffix in _SUFFIXES.items()},
-    "las-annotated": annotate_las,
-    "ply-annotated": annotate_ply,
+    "las-annotated": annotate(read_scan(".las"), ".las"),
+    "ply-annotated": annotate(read_scan(""), ".ply"),
     "config": read_config,
     "override": read_override,
     "catalogue": read_catalogue(".csv"),
@@ -202,5 +186,3 @@ FUNCTIONS = {
 }
 TARGETS = {name: (seeds_of(name), function) for name, function in FUNCTIONS.items()}
 """Name of a target: its seeds, and its function."""
-
-warnings.filterwarnings("ignore", category=DeprecationWarning)
