@@ -139,8 +139,8 @@ _MAGIC = (
     (b"OFF\r", _OFF),
 )
 _HTML_START = re.compile(rb"\s*<(!doctype html|html)", re.IGNORECASE)
-_VERTEX = re.compile(rb"^v[ \t]+[-+.\d]+[ \t]+[-+.\d]+", re.MULTILINE)
-_FACE = re.compile(rb"^(f[ \t]+\d|vn[ \t]|vt[ \t]|mtllib[ \t]|o[ \t]|g[ \t]|v[ \t])", re.MULTILINE)
+_VERTEX = re.compile(rb"^v([ \t]+[-+.\d][-+.\deE]*){3}", re.MULTILINE)
+_FACE = re.compile(rb"^(f[ \t]+\d|vn[ \t]|vt[ \t]|mtllib[ \t]|o[ \t]|g[ \t])", re.MULTILINE)
 _DXF_START = re.compile(rb"\s*(0|999[\r\n].*?)\s*[\r\n]+\s*(0\s*[\r\n]+\s*)?SECTION", re.DOTALL)
 
 
@@ -186,6 +186,7 @@ def foreign_content(head: bytes) -> Foreign | None:
         return Foreign("VRML, a mesh", _SAMPLE)
     if head[257:262] == b"ustar":
         return _TAR
-    if _VERTEX.search(text) and _FACE.search(text):
+    vertices = len(_VERTEX.findall(text))
+    if vertices > 1 or (vertices == 1 and _FACE.search(text)):
         return _OBJ
     return _DXF if _DXF_START.match(text[:200]) else None

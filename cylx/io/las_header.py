@@ -81,6 +81,8 @@ def las_header(source: Input) -> LasFacts:
         raise InputError(place, fault, "export the file again as LAS 1.2 or 1.4")
     if start > source.size:
         raise InputError(place, "the file ends within the LAS header", _REMEDY)
+    if size < (_WITH_COUNT if minor >= 4 else _LEAST):
+        raise InputError(place, f"the LAS header of {size} bytes is too short for LAS 1.{minor}", _REMEDY)
     if size + _VLR * vlrs > start:
         raise InputError(place, f"the LAS header has no room for its {vlrs} records", _REMEDY)
     compressed = kind & 0xC0 == 0x80

@@ -11,7 +11,7 @@ SEEDS = Path(__file__).parent / "seeds"
 _MEMORY = Path("/dev/shm")
 _SUFFIXES = {
     "xyz": ".xyz", "csv": ".csv", "pts": ".pts", "ply": ".ply", "pcd": ".pcd", "npy": ".npy", "npz": ".npz",
-    "las": ".las", "guessed": "",
+    "guessed": "",
 }  # fmt: skip
 
 
@@ -43,6 +43,25 @@ def read_scan(suffix):
         return cloud
 
     return read
+
+
+def read_las_here(data):
+    """Read a LAS file in this process."""
+    import numpy as np
+
+    from cylx.io.inputs import open_input
+    from cylx.io.las import read_las
+    from cylx.io.las_header import kept_header, las_header
+    from cylx.records import PointCloud, Source
+
+    with open_input(SCRATCH.put("scan.las", data)) as source:
+        table = read_las(source)
+        header = kept_header(source, las_header(source))
+    with np.errstate(all="ignore"):
+        points = np.column_stack([table[axis] for axis in "xyz"])
+    cloud = PointCloud(points, table, None, Source("scan.las", "las", header=header))
+    check_cloud(cloud)
+    return cloud
 
 
 def check_cloud(cloud):
@@ -173,7 +192,8 @@ def seeds_of(name):
 
 FUNCTIONS = {
     **{name: read_scan(suffix) for name, suffix in _SUFFIXES.items()},
-    "las-annotated": annotate(read_scan(".las"), ".las"),
+    "las": read_las_here,
+    "las-annotated": annotate(read_las_here, ".las"),
     "ply-annotated": annotate(read_scan(""), ".ply"),
     "config": read_config,
     "override": read_override,
