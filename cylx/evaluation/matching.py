@@ -137,6 +137,13 @@ def require_usable(table: CylinderTable, place: str, key: str = "cylinders") -> 
 
 def pair_errors(a: CylinderTable, b: CylinderTable) -> PairErrors:
     """Compute the errors of all pairs, row by row, which keeps the precision far from the origin and saves memory."""
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # numbers near the largest: what is infinitely far matches nothing
+        return _pair_errors(a, b)
+
+
+def _pair_errors(a: CylinderTable, b: CylinderTable) -> PairErrors:
     angle, offset, shift = np.empty((3, len(a), len(b)))
     for i in range(len(a)):
         sine = np.linalg.norm(np.cross(a.directions[i], b.directions), axis=1)

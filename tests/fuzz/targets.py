@@ -166,8 +166,9 @@ def use_option(data):
     scan = str(Path(SCRATCH.folder.name) / "none.ply")
     outcome = CliRunner().invoke(main, ["extract", scan, f"{name}={value}"])
     if isinstance(outcome.exception, SystemExit | click.exceptions.Exit) and outcome.exit_code in (2, 3):
-        lines = outcome.output.strip().splitlines()
-        raise UsageError("option", " ".join(lines) if len(lines) < 2 else "several lines\n", "correct it")
+        if len(outcome.output.strip().splitlines()) > 1 or len(outcome.output) > 1000:
+            raise AssertionError(f"a message of {len(outcome.output)} letters: {outcome.output[:100]!r}")
+        raise UsageError("option", "is refused", "correct it")
     raise AssertionError(f"exit code {outcome.exit_code}: {outcome.output[:300]!r} {outcome.exception!r}")
 
 
