@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from cylx.io.annotated import check_annotated as check_annotated
+    from cylx.io.annotated import las_obstacle as las_obstacle
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
@@ -37,6 +38,7 @@ _HOMES = {
     "cloud_suffix": "cylx.io.formats",
     "cloud_suffixes": "cylx.io.clouds",
     "expected_points": "cylx.io.sizes",
+    "las_obstacle": "cylx.io.annotated",
     "printable": "cylx.io.inputs",
     "read_cloud": "cylx.io.clouds",
     "read_json": "cylx.io.inputs",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import tempfile
 from pathlib import Path
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
     from cylx.records import Extraction, PointCloud
 
+_TRIED = 3
 _OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "blue": "u1"}
 
 
@@ -87,12 +89,46 @@ def check_annotated(path: str | Path, cloud: PointCloud) -> None:
     suffix = Path(path).suffix.lower()
     if suffix in LAS_SUFFIXES and (cloud.source.header is None or cloud.table is None):
         raise OutputError(printable(path), "the input is neither LAS nor LAZ", "choose a name that ends in .ply")
+    obstacle = las_obstacle(path, cloud)
+    if obstacle:
+        raise OutputError(printable(path), obstacle, "choose a name that ends in .ply")
     if suffix == ".pcd" and cloud.table is not None:
         dtype = cloud.table.dtype
         lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
         if lists:
             fault = f"PCD cannot hold the list property {excerpt(lists[0])}"
             raise OutputError(printable(path), fault, "choose a name that ends in .ply")
+
+
+def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
+    """Return why a cloud from LAS or LAZ cannot be written as such again: tried with its first points.
+
+    Parameters
+    ----------
+    path : str or Path
+        Name of the annotated cloud.
+    cloud : PointCloud
+
+    Returns
+    -------
+    str
+        Empty if it can, or if it is to be written in another format, or is from neither.
+    """
+    header, table, suffix = cloud.source.header, cloud.table, Path(path).suffix.lower()
+    if suffix not in LAS_SUFFIXES or header is None or table is None:
+        return ""
+    from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
+
+    few = table[:_TRIED]
+    ours = {name: np.zeros(len(few), kind) for name, kind in _OURS.items()}
+    try:
+        write_las(io.BytesIO(), header, few, [(slice(0, len(few)), ours)], compressed=suffix == ".laz")
+    except MemoryError:
+        raise
+    except Exception as error:  # noqa: BLE001  laspy raises whatever it meets
+        fault = " ".join(str(error).split()) or type(error).__name__
+        return f"laspy cannot write this file again: {excerpt(fault, 100)}"
+    return ""
 
 
 def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:
@@ -148,13 +184,14 @@ def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray
 
 
 def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> None:
-    """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek."""
+    """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek, or has to be read again."""
     from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
+    from cylx.io.las_mend import has_letters  # noqa: PLC0415  for this alone
 
     header, table = extraction.cloud.source.header, extraction.cloud.table
     if header is None or table is None:
         raise ValueError("only clouds from LAS and LAZ can be written as such")
-    if file.seekable():
+    if file.seekable() and not has_letters(header):
         write_las(file, header, table, _findings(extraction), compressed=compressed)
         return
     with tempfile.TemporaryFile() as copy:

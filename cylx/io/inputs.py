@@ -6,6 +6,7 @@ import difflib
 import hashlib
 import json
 import os
+import re
 import stat
 import sys
 import tempfile
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _BLOCK = 1 << 20
+_HALF_LETTER = re.compile(rb"\\u[dD][89a-fA-F]")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +103,20 @@ def read_json(path: str | Path) -> dict[str, Any]:
         raise InputError(place, f"not JSON: {fault}", "give a JSON file as cylx writes it") from None
     if not isinstance(document, dict):
         raise InputError(place, "is not a JSON object", "give a JSON file as cylx writes it")
+    if _HALF_LETTER.search(data) and not _is_text(document):
+        raise InputError(
+            place, "not JSON: an escape such as \\ud800 is half a letter", "give the file as it was written"
+        )
     return document
+
+
+def _is_text(document: object) -> bool:
+    """Return whether all letters of a document can be written."""
+    try:
+        json.dumps(document, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def sha256_of(path: str | Path) -> str:
@@ -121,9 +136,9 @@ def printable(path: str | Path) -> str:
     return text if (text := str(path)).isprintable() else repr(text)
 
 
-def excerpt(text: str) -> str:
+def excerpt(text: str, most: int = 40) -> str:
     """Quote a piece of a file so that it fits on one line of a message."""
-    return ascii(text if len(text) <= 40 else text[:37] + "...")
+    return ascii(text if len(text) <= most else text[: most - 3] + "...")
 
 
 def _open(path: str | Path, place: str) -> AbstractContextManager[BinaryIO]:

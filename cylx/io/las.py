@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import io
 import logging
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.las_header import LasFacts, las_header
+from cylx.io.las_mend import Spliced, mended
 from cylx.io.laz_chunks import check_chunks
 from cylx.io.names import mended_names
 from cylx.io.rows import short_of_points
@@ -99,13 +101,13 @@ def quiet_laspy() -> Iterator[None]:
 def _read(source: Input, facts: LasFacts, allocate: Allocate) -> NDArray[np.void]:
     import laspy  # noqa: PLC0415  an extra
 
-    source.file.seek(0)
+    file = _mended_file(source, facts)
     backend = None
     if facts.compressed:
-        parallel = check_chunks(source, facts, laspy.LasHeader.read_from(source.file))
+        parallel = check_chunks(source, facts, laspy.LasHeader.read_from(file))
         backend = laspy.LazBackend.LazrsParallel if parallel else laspy.LazBackend.Lazrs
-        source.file.seek(0)
-    with laspy.open(source.file, closefd=False, read_evlrs=False, laz_backend=backend) as reader:
+        file.seek(0)
+    with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=backend) as reader:
         header = reader.header
         columns = las_dimensions(header.point_format)
         types = [*((axis, np.dtype("f8")) for axis in "xyz"), *((one.name, one.type) for one in columns)]
@@ -121,6 +123,14 @@ def _read(source: Input, facts: LasFacts, allocate: Allocate) -> NDArray[np.void
     if done < facts.points:
         raise short_of_points(source.place, facts.points, done)
     return table
+
+
+def _mended_file(source: Input, facts: LasFacts) -> BinaryIO:
+    """Return the file at its beginning, or one with a mended header if laspy needs one."""
+    head = source.head(facts.start)
+    better = mended(head, facts.points)
+    source.file.seek(0)
+    return source.file if better == head else cast("BinaryIO", io.BufferedReader(Spliced(better, source.file)))
 
 
 @contextmanager

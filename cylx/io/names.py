@@ -46,15 +46,17 @@ def mended_names(names: Sequence[str]) -> list[str]:
     >>> mended_names(["scan angle", "a", "a", ""])
     ['scan_angle', 'a', 'a_2', 'property']
     """
-    mended: list[str] = []
+    mended: dict[str, None] = {}
+    counts: dict[str, int] = {}
     for name in names:
         stem = re.sub(r"[^!-~]+", "_", name.strip()) or "property"
-        candidate, count = stem, 1
+        candidate, count = stem, counts.get(stem, 1)
         while candidate in mended:
             count += 1
             candidate = f"{stem}_{count}"
-        mended.append(candidate)
-    return mended
+        counts[stem] = count
+        mended[candidate] = None
+    return [*mended]
 
 
 def _shadowed(name: str, have: set[str]) -> bool:

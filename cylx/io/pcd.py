@@ -8,6 +8,7 @@ points that a short body lacks, and drops fields that it does not use. open3d un
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
@@ -31,6 +32,8 @@ _TYPES = {
     **{(kind, size): f"<{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)},
 }
 _KEYS = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
+_ALIASES = {"COLUMNS": "FIELDS"}
+_BOM = b"\xef\xbb\xbf"
 _BODIES = ("ascii", "binary", "binary_compressed")
 _MOST_HEADER = 1 << 20
 _MOST_EXPANSION = 100  # LZF makes at most 264 bytes of 3
@@ -238,27 +241,30 @@ def _without_open3d(source: Input) -> InputError:
 
 
 def _read_header(source: Input) -> _Header:
-    """Read the lines up to DATA and check them against each other."""
+    """Read the lines up to DATA and check them against each other; keys in small letters and unknown ones are fine."""
     head = source.head(_MOST_HEADER)
     said: dict[str, list[str]] = {}
-    start = number = 0
+    start = len(_BOM) if head.startswith(_BOM) else 0
+    number = 0
     while "DATA" not in said:
         stop = head.find(b"\n", start)
         if stop < 0:
             raise _unfinished(source, said)
         number += 1
-        words = head[start:stop].decode("utf-8", "backslashreplace").partition("#")[0].split()
+        line = head[start:stop].decode("utf-8", "backslashreplace").strip()
         start = stop + 1
-        if not words:
+        words = line.split()
+        if not words or line.startswith("#"):
             continue
-        key = "FIELDS" if words[0] == "COLUMNS" else words[0]
-        if key not in _KEYS:
-            if not said:
-                raise InputError(source.place, "is not PCD: it does not begin with its header", _SUFFIX_REMEDY)
+        key = _ALIASES.get(words[0].upper(), words[0].upper())
+        if key in _KEYS:
+            said[key] = words[1:] if key == "FIELDS" else line.partition("#")[0].split()[1:]
+        elif not said:
+            raise InputError(source.place, "is not PCD: it does not begin with its header", _SUFFIX_REMEDY)
+        elif len(words) < 2 or not words[0].isidentifier():
             fault = f"{excerpt(' '.join(words))} is not a line of a PCD header"
             raise InputError(f"{source.place}:{number}", fault, _REMEDY)
-        said[key] = words[1:]
-    body = " ".join(said["DATA"])
+    body = " ".join(said["DATA"]).lower()
     if body not in _BODIES:
         raise InputError(
             f"{source.place}:{number}", f"unknown DATA {excerpt(body)}", f"use one of {', '.join(_BODIES)}"
@@ -276,6 +282,8 @@ def _unfinished(source: Input, said: dict[str, list[str]]) -> InputError:
 
 def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
     names = said.get("FIELDS", [])
+    if len(names) != len(said.get("SIZE", names)):  # a `#` may begin a comment, or belong to a name
+        names = list(takewhile(lambda name: not name.startswith("#"), names))
     missing = missing_coordinates(names)
     if missing:
         raise InputError(place, f"FIELDS has no {missing}", "give a PCD with x, y and z")

@@ -194,6 +194,8 @@ class Batch:
             self.run.messages.say(found_line(job, outcome.finished.cylinders, outcome.finished.blends))
             for warning in outcome.finished.warnings:
                 self.run.messages.say(f"warning: {printable(job.scan)}: {warning}")
+            for note in outcome.finished.notes:
+                self.run.messages.say(f"note: {printable(job.scan)}: {note}")
 
     def _show_counts(self, failed: int, seconds: float) -> None:
         if self.run.messages.quiet:

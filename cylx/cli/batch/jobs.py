@@ -13,7 +13,7 @@ from cylx.errors import OutputError, UsageError
 from cylx.io.outputs import STREAM, moved_at_the_end
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, PointCloud
+    from cylx.records import Extraction
     from cylx.results import Result
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
@@ -154,20 +154,6 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
     names = [name for job in jobs if _is_there(job.scan) for name in job.outputs]
     for name in [*names, *others]:
         check_writable(name, overwrite=overwrite)
-
-
-def check_format(job: Job, cloud: PointCloud) -> None:
-    """Refuse a format of the annotated cloud that cannot hold the scan, before anything is computed.
-
-    Raises
-    ------
-    OutputError
-        If the format cannot hold it.
-    """
-    from cylx.io import check_annotated
-
-    if job.annotated is not None:
-        check_annotated(job.annotated, cloud)
 
 
 def _mesh(job: Job, content: Result) -> tuple[bytes | None, list[str]]:

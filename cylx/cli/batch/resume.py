@@ -46,10 +46,12 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
     Result or None
         None if the scan has to be processed.
     """
+    from cylx.cli.batch.annotated import as_written
     from cylx.io import read_json, recorded_name, sha256_of
     from cylx.results import Result
     from cylx.version import __version__
 
+    job = as_written(job)
     if STREAM in (job.scan, *job.outputs) or not all(Path(name).is_file() for name in job.written(0)):
         return None
     try:

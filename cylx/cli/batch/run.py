@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cylx.cli.batch.jobs import Job, check_format, write_job
+from cylx.cli.batch.annotated import check_format
+from cylx.cli.batch.jobs import Job, write_job
 from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_outcome
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
 
@@ -68,7 +69,7 @@ class Run:
             observer = Observers(display, stopwatch)
             with observed(observer, "reading"):
                 cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
-            check_format(job, cloud)
+            job, notes = check_format(job, cloud, overwrite=self.overwrite)
             compile_kernels(observer)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
             with observed(observer, "writing"):
@@ -78,7 +79,10 @@ class Run:
         report(self.messages, job, extraction)
         for remark in remarks:
             self.messages.say(f"warning: {remark}")
-        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()))
+        notes = [*cloud.source.notes, *notes]
+        for note in notes:
+            self.messages.say(f"note: {note}")
+        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()), notes)
 
 
 def attempt(run: Run, debug: bool, job: Job) -> Outcome:

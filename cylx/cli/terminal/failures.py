@@ -19,6 +19,7 @@ from cylx.harmless import visible
 DEBUG = "cylx.debug"  # key in the context's meta
 BUG, USAGE, UNUSABLE, INTERRUPTED, READER_GONE = 1, 2, 3, 130, 141
 
+_LONGEST = 400
 _PASSED_ON = (click.exceptions.Exit, SystemExit, GeneratorExit)
 
 
@@ -177,7 +178,10 @@ def _usage_line(failure: click.ClickException) -> str:
     if isinstance(failure, getattr(click.exceptions, "NoArgsIsHelpError", ())):
         return failure.format_message()
     see = f"; see '{context.command_path} --help'" if context is not None else ""
-    return _one_line(f"cylx: {failure.format_message().rstrip('.')}{see}")
+    message = failure.format_message().rstrip(".")
+    if len(message) > _LONGEST:  # it repeats what was given
+        message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 2 :]}"
+    return _one_line(f"cylx: {message}{see}")
 
 
 def _one_line(text: str) -> str:
