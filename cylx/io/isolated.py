@@ -213,11 +213,9 @@ def _process(fds: list[int]) -> Iterator[subprocess.Popen[bytes]]:
 def _target() -> Iterator[IO[bytes]]:
     """Yield an empty file for the points: in memory on Linux, else on disk."""
     if hasattr(os, "memfd_create"):
-        with suppress(OSError):
-            memory = os.memfd_create("cylx")
-            with os.fdopen(memory, "r+b", buffering=0) as file:
-                yield file
-            return
+        with os.fdopen(os.memfd_create("cylx"), "r+b", buffering=0) as file:
+            yield file
+        return
     with tempfile.TemporaryDirectory(prefix="cylx-") as folder, (Path(folder) / "points").open("w+b") as file:
         yield file
 
@@ -250,7 +248,11 @@ def _passed_on(file: IO[bytes]) -> Iterator[tuple[str, int | None]]:
         return
     import fcntl  # noqa: PLC0415  not on Windows
 
-    descriptor = fcntl.fcntl(file.fileno(), fcntl.F_DUPFD_CLOEXEC, 3)
+    descriptor = file.fileno()
+    if descriptor > 2:
+        yield f"/proc/self/fd/{descriptor}", descriptor
+        return
+    descriptor = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3)
     try:
         yield f"/proc/self/fd/{descriptor}", descriptor
     finally:
