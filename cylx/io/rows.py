@@ -247,7 +247,8 @@ def _one_mark(before: str, values: Iterable[str], where: str) -> str:
     InputError
         If a row has a comma for a decimal mark, and another row or value a point.
     """
-    marks = {"," if "," in value else "." for value in values if DECIMAL_COMMA.fullmatch(value) or "." in value}
+    numbers = (value for value in values if SHARP not in value)
+    marks = {"," if "," in value else "." for value in numbers if DECIMAL_COMMA.fullmatch(value) or "." in value}
     if len(marks | set(before)) > 1:
         raise InputError(where, "some numbers have a decimal comma, others a point", "write all of them with a point")
     return before or "".join(marks)
