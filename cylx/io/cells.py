@@ -12,12 +12,13 @@ from cylx.errors import InputError
 from cylx.io.inputs import excerpt
 
 COMMENTS = ("#", "//")
-DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+([eE][-+]?\d+)?", re.ASCII)
+DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?", re.ASCII)
 _NOT_A_NUMBER = re.compile(r"[-+]?(nan\(\w*\)|1\.#(IND|QNAN|SNAN|INF|R)0*)", re.IGNORECASE)
 """How Windows wrote NaN and infinity …"""
 SHARP = "1.#"
 """… and what begins no comment therefore."""
 _MOST_DIGITS = 18
+_MISSING = frozenset(("", "NA", "N/A", "NULL", "NONE"))
 
 
 def uncommented(line: str) -> str:
@@ -54,6 +55,11 @@ def is_count(text: str) -> bool:
     return text.isascii() and text.isdecimal() and len(text) <= _MOST_DIGITS
 
 
+def is_missing(text: str) -> bool:
+    """Return whether a cell says that there is no value."""
+    return text in _MISSING or text.upper() in _MISSING
+
+
 def plain_number(text: str) -> str:
     """Return a number with a point for a comma, and with the NaN of Windows as others write it.
 
@@ -62,6 +68,8 @@ def plain_number(text: str) -> str:
     >>> plain_number("1,5"), plain_number("-nan(ind)"), plain_number("1.5")
     ('1.5', 'nan', '1.5')
     """
+    if text[:1] == "'" == text[-1:]:
+        text = text[1:-1]
     if DECIMAL_COMMA.fullmatch(text):
         return text.replace(",", ".")
     return "nan" if _NOT_A_NUMBER.fullmatch(text) else text

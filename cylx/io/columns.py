@@ -31,8 +31,8 @@ _HEIGHT_FILLERS = _words("ellipsoidal ellipsoid orthometric ortho mean msl asl s
 _FAMILIES = (
     (frozenset("x"), frozenset("y")),
     (
-        _words("easting eastings east e este ost ostwert rechtswert rechts rw"),
-        _words("northing northings north n norte nord nordwert hochwert hoch hw"),
+        _words("easting eastings east e este leste oost ost ostwert rechtswert rechts rw"),
+        _words("northing northings north n norte noord norr nord nordwert hochwert hoch hw"),
     ),
     (_words("est"), _words("nord")),
     (_words("longitude lon long lng"), _words("latitude lat")),
@@ -40,8 +40,11 @@ _FAMILIES = (
 """Names of the two horizontal axes: as x and y, on a map, and in degrees."""
 _DEGREES = 3
 _HEIGHTS = _words(
-    "elevation elevations elev height heights h alt altitude hohe hoehe rl cota quota altura altezza hauteur elevacion"
+    "elevation elevations elev height heights h alt altitude hohe hoehe hoogte hojd rl cota quota altura altezza "
+    "hauteur elevacion"
 )
+_ALONG = _words("easting east northing north elevation elev height altitude up right forward")
+"""Words that may stand beside x, y or z, which count."""
 _OTHERS = _words(
     "intensity reflectance reflectivity amplitude remission red green blue rgb rgba alpha nx ny nz normal normals "
     "curvature time timestamp gps class classification label ring laser return returns azimuth range distance angle "
@@ -91,7 +94,8 @@ def named_coordinates(names: Sequence[str]) -> Coordinates | None:
     exact = coordinate_names(names)
     if len(exact) == 3:
         x, y, z = (names.index(name) for name in exact)
-        return Coordinates((x, y, z))
+        again = any(names.count(name) > 1 for name in exact) or {*names} >= set("xyzXYZ")
+        return Coordinates((x, y, z), _several(names, (x, y, z)) if again else ())
     read = [_read_name(name) for name in names]
     return _grouped(names, read) or _paired(names, read)
 
@@ -128,7 +132,7 @@ def _read_name(name: str) -> tuple[str, tuple[str, ...]]:
     spare = [word for word in words if word not in _UNITS]
     axes = [word for word in spare if word in ("x", "y", "z")]
     rest = tuple(word for word in spare if word not in axes)
-    if len(axes) == 1 and _FILLERS.issuperset(rest):
+    if len(axes) == 1 and (_FILLERS | _ALONG).issuperset(rest):
         return axes[0], rest
     places = [word for word in spare if word in ("0", "1", "2")]
     rest = tuple(word for word in spare if word not in places)
@@ -147,7 +151,7 @@ def _words_of(name: str) -> list[str]:
     text = re.sub(r"\[\s*([0-2])\s*\]", r" \1 ", text)
     text = re.sub(r"\([^)]*\)|\[[^\]]*\]|\{[^}]*\}|<[^>]*>", " ", text)
     text = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?=\d)|(?<=^[xyz])(?=[A-Z])", " ", text)
-    return re.findall(r"[a-z]+|\d+", text.lower())
+    return re.findall(r"[^\W\d_]+|\d+", text.lower())
 
 
 def _grouped(names: Sequence[str], read: Sequence[tuple[str, tuple[str, ...]]]) -> Coordinates | None:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def coordinate_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Find the properties x, y and z, in this order; capital letters are accepted if there are no small ones.
+    """Find the properties x, y and z, in this order; capital letters are accepted if the small ones are not complete.
 
     Returns
     -------
@@ -21,8 +21,12 @@ def coordinate_names(names: Iterable[str]) -> tuple[str, ...]:
     --------
     >>> coordinate_names(["intensity", "z", "X", "y"])
     ('X', 'y', 'z')
+    >>> coordinate_names(["x", "y", "X", "Y", "Z"])
+    ('X', 'Y', 'Z')
     """
     have = set(names)
+    if have >= set("XYZ") and not have >= set("xyz"):
+        return ("X", "Y", "Z")
     return tuple(name for axis in "xyz" for name in (axis, axis.upper()) if name in have and not _shadowed(name, have))
 
 

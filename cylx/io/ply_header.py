@@ -193,7 +193,7 @@ def _property(words: list[str], where: str) -> Property:
         words = [{"long": "longlong", "unsigned": "ulong"}[words[0]], words[2]]
     if len(words) == 2 and words[0] in TYPES:
         return Property(words[1], words[0])
-    if len(words) == 4 and words[0] == "list" and {words[1], words[2]} <= TYPES.keys() - STANDARD.keys():
+    if len(words) == 4 and words[0] == "list" and words[1] in TYPES and words[1] not in STANDARD and words[2] in TYPES:
         return Property(words[3], words[2], words[1])
     raise InputError(where, f"{excerpt(' '.join(words))} is not a property type and name", _REMEDY)
 
@@ -211,6 +211,9 @@ def _check_vertex(vertex: Element, place: str) -> None:
     for item in vertex.properties:
         if item.length and item.name in coordinate_names(names):
             raise InputError(place, f"the property {item.name} is a list", "give a PLY with one x, y and z per point")
+        if item.length and STANDARD.get(item.type) == "double":
+            fault = f"the list property {excerpt(item.name)} is made of {item.type}"
+            raise InputError(place, fault, "leave it out, or write it as int")
     if vertex.count == 0:
         raise InputError(place, "holds no points", "give a file with points")
 

@@ -19,6 +19,7 @@ from cylx.io.cells import (
     all_cells,
     check_number,
     is_count,
+    is_missing,
     plain_number,
     split_row,
     uncommented,
@@ -33,6 +34,8 @@ if TYPE_CHECKING:
 LONGEST_LINE = 1 << 20
 """Letters of a line: more than any table of points has."""
 _BLOCK = 1 << 20
+_END = "\x1a"
+"""What ends a text of DOS."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,6 +215,8 @@ def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]
             fault = f"expected {rows.width} columns, found {len(columns)}"
             raise InputError(where, fault, "give every row the same columns")
         values = columns if rows.kept is None else [columns[place] for place in rows.kept]
+        if rows.loose:
+            values = ["" if is_missing(value) else value for value in values]
         marks = _one_mark(marks, values, where)
         values = [plain_number(value) for value in values]
         yield " ".join(_filled(values, rows, where))
@@ -223,6 +228,8 @@ def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]
 def _row_of(line: str, rows: RowFormat) -> list[str]:
     """Return the columns of a line, without its comment; a mark within a name begins none."""
     row = uncommented(line) if rows.commented else line.strip()
+    if row == _END:
+        return []
     for text in (row,) if rows.kept is None else dict.fromkeys((row, line.strip())):
         columns = all_cells(text, rows.delimiter)
         if columns and columns[-1] == "" and len(columns) != rows.width:
@@ -240,7 +247,8 @@ def _one_mark(before: str, values: Iterable[str], where: str) -> str:
     InputError
         If a row has a comma for a decimal mark, and another row or value a point.
     """
-    marks = {"," if "," in value else "." for value in values if DECIMAL_COMMA.fullmatch(value) or "." in value}
+    numbers = (value for value in values if SHARP not in value)
+    marks = {"," if "," in value else "." for value in numbers if DECIMAL_COMMA.fullmatch(value) or "." in value}
     if len(marks | set(before)) > 1:
         raise InputError(where, "some numbers have a decimal comma, others a point", "write all of them with a point")
     return before or "".join(marks)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from cylx.errors import InputError
-from cylx.io.cells import is_number, plain_number
+from cylx.io.cells import is_missing, is_number, plain_number
 from cylx.io.columns import Coordinates, is_other, named_axes, named_coordinates
 from cylx.io.inputs import excerpt
 from cylx.io.names import mended_names
@@ -60,7 +60,7 @@ def choose_columns(top: Top, place: str) -> Columns:
     InputError
         If the names and the rows contradict each other.
     """
-    width = _width(top)
+    width = len(top.rows[0])
     rows = [row for row in top.rows if len(row) == width] or top.rows[:1]
     names = names_of(top.header, width, top.delimiter) if top.header else []
     if names and _is_mark(top, names, rows, width):
@@ -82,16 +82,6 @@ def choose_columns(top: Top, place: str) -> Columns:
     return Columns([labels[column] for column in kept], only, width, tuple(notes), tuple(doubts))
 
 
-def _width(top: Top) -> int:
-    """Return the number of columns; the last one of the first row may be empty."""
-    first = len(top.rows[0])
-    if top.header and top.delimiter is not None:
-        named = len(words_of(top.header, top.delimiter))
-        if named > first and any(len(row) == named for row in top.rows) and all(len(row) <= named for row in top.rows):
-            return named
-    return first
-
-
 def _is_mark(top: Top, names: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> bool:
     """Return whether a `#` that begins the names is the mark of a comment rather than a name."""
     bare = words_of(top.header, top.delimiter)
@@ -111,7 +101,7 @@ def _aligned(top: Top, width: int, place: str) -> Coordinates | None:
             remedy = "write numbers with a point, or semicolons between the columns"
             raise InputError(place, f"has {len(said)} names and {width} columns, as decimal commas give", remedy)
         return found
-    if top.commented:
+    if top.commented or max(found.places) - min(found.places) != 2:  # or a title that has these letters
         return None
     if sorted(found.places) == [len(said) - 3, len(said) - 2, len(said) - 1]:
         x, y, z = (column + width - len(said) for column in found.places)
@@ -131,9 +121,9 @@ def _word_columns(rows: Sequence[Sequence[str]], width: int, coordinates: Sequen
     for column in range(width):
         if column in coordinates:
             continue
-        cells = [row[column] for row in rows if row[column]]
+        cells = [row[column] for row in rows if not is_missing(row[column])]
         words = [cell for cell in cells if not is_number(plain_number(cell))]
-        first = bool(rows[0][column]) and not is_number(plain_number(rows[0][column]))
+        first = bool(words) and words[0] == rows[0][column]
         if first or 2 * len(words) > len(cells):
             found.append(column)
     return found

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from cylx.errors import InputError
 from cylx.io.cells import (
     COMMENTS,
+    all_cells,
     check_number,
     is_count,
+    is_missing,
     is_number,
     plain_number,
     split_row,
@@ -84,7 +86,7 @@ def read_top(lines: io.TextIOBase, place: str) -> Top:
                 header, commented = line.text, line.text.startswith(COMMENTS)
             continue
         delimiter = delimiter_of(line.row)
-        columns = split_row(line.row, delimiter)
+        columns = _cells(line.row, delimiter, header)
         numbers = sum(_is_value(column) for column in columns)
         if len(columns) == 1 and is_count(columns[0]):
             if count is not None:
@@ -93,18 +95,21 @@ def read_top(lines: io.TextIOBase, place: str) -> Top:
                 break
             count = int(columns[0])
             continue
+        if numbers < 3 and _is_row_with_gaps(header, columns, delimiter):
+            rows = [_cells(one.row, delimiter, header) for one in sample[index:] if one.row]
+            return Top(line.number - 1, delimiter, header, commented, count, rows)
         if numbers == 0:
             if commented or delimiter:
                 header, commented = (line.text, False) if not _is_named(header) else (header, commented)
             wrong = wrong or (line if words else None)
             words = line
             continue
-        if _is_title(columns, numbers, sample[index + 1 :]):
+        if _is_title(columns, numbers, sample[index + 1 :], header):
             wrong = wrong or line
             if commented and not _is_named(header):
                 header, commented = line.text, False
             continue
-        rows = [split_row(one.row, delimiter) for one in sample[index:] if one.row]
+        rows = [_cells(one.row, delimiter, header) for one in sample[index:] if one.row]
         _check_first_row(f"{place}:{line.number}", columns)
         return Top(line.number - 1, delimiter, header, commented, count, rows)
     if wrong is not None:
@@ -210,16 +215,33 @@ def _is_value(text: str) -> bool:
     return is_number(plain_number(text))
 
 
-def _is_title(columns: Sequence[str], numbers: int, below: Sequence[_Line]) -> bool:
-    """Return whether a line with words and numbers is a title rather than a row."""
+def _is_title(columns: Sequence[str], numbers: int, below: Sequence[_Line], header: str) -> bool:
+    """Return whether a line with words and numbers is a title rather than a row, perhaps a damaged one."""
     if numbers == len(columns) or _is_value(columns[0]):
         return False
-    if numbers < 3:
-        return True
     following = next((line.row for line in below if line.row), None)
     if following is None:
-        return False
-    return len(split_row(following, delimiter_of(following))) != len(columns)
+        return numbers < 3
+    delimiter = delimiter_of(following)
+    cells = _cells(following, delimiter, header)
+    found = sum(map(_is_value, cells))
+    if len(cells) == len(columns):
+        return numbers < 3 and (found < 3 or _is_value(cells[0]))  # or else it is a row like the next, but damaged
+    return numbers < 3 or found in (0, len(cells))
+
+
+def _cells(row: str, delimiter: str | None, header: str) -> list[str]:
+    """Return the columns of a row; an empty one at the end counts if it has a name."""
+    cells = all_cells(row, delimiter)
+    if cells and cells[-1] == "" and not (header and len(words_of(header, delimiter)) == len(cells)):
+        cells.pop()
+    return cells
+
+
+def _is_row_with_gaps(header: str, columns: Sequence[str], delimiter: str | None) -> bool:
+    """Return whether a line is a row some of whose values are missing: the names of the columns stand above it."""
+    gaps = any(is_missing(column) for column in columns)
+    return gaps and _is_named(header) and bool(names_of(header, len(columns), delimiter))
 
 
 def _check_first_row(where: str, columns: Sequence[str]) -> None:

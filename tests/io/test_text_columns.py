@@ -88,6 +88,17 @@ SILENT = {
     "a column without values": "x,y,z,label\n" + rows(lambda _, p: [*p, ""]),
     "a first column without values": "label,x,y,z\n" + rows(lambda _, p: ["", *p]),
     "separators at the ends": "x,y,z,i,\n" + rows(lambda i, p: [*p, i % 5, ""]),
+    "gaps in the first row": "id,x,y,z\n7,,,\n" + rows(numbered),
+    "no values in the first row": "id,x,y,z\nNA,NULL,NULL,NULL\n" + rows(numbered),
+    "two empty columns at the end": "x,y,z,a,b\n" + rows(lambda _, p: [*p, "", ""]),
+    "pixels beside points": "x,y,X,Y,Z\n" + rows(lambda _, p: [1, 2, *p]),
+    "X and Easting": "id,X_Easting,Y_Northing,Z_Elevation\n" + rows(numbered),
+    "Easting (X)": "id,Easting(X),Northing(Y),Elevation(Z)\n" + rows(numbered),
+    "blanks before commas": "x ,y ,z\n" + rows(sep=" ,"),
+    "two titles": "Plant 7\nScan 3 of 9 by 2 people\nX Y Z i\n" + rows(more, " "),
+    "a title with as many words as columns": "Plant 7 hall 3\nX Y Z i\n" + rows(more, " "),
+    "the end of a text of DOS": "x y z\n" + rows(sep=" ") + "\x1a",
+    "Dutch": "Nr;Oost;Noord;Hoogte\n" + rows(numbered, ";", ","),
     "UTF-16": ("x;y;z\n" + rows(sep=";")).encode("utf-16"),
     "UTF-16 without a mark": ("x;y;z\n" + rows(sep=";")).encode("utf-16-be"),
     "UTF-32": ("x;y;z\n" + rows(sep=";")).encode("utf-32"),
@@ -125,6 +136,10 @@ TOLD = {
     "words with separators": ("x,y,z,code\n" + rows(lambda _, p: [*p, '"tree, big"']), WORDS + "'code'"),
     "words with a #": ("x;y;z;code\n" + rows(lambda i, p: [*p, f"tree #{i}"], ";"), WORDS + "'code'"),
     "words with spaces": ("code\tx\ty\tz\n" + rows(lambda _, p: ["big tree", *p], "\t"), WORDS + "'code'"),
+    "codes that are missing": (
+        "Point,Northing,Easting,Elevation,Code\n" + rows(lambda i, p: [f"P{i}", p[1], p[0], p[2], ""]),
+        WORDS + "'Point'",
+    ),
     "times": ("time,x,y,z\n" + rows(lambda i, p: [f"2024-05-03 12:00:{i:02}", *p]), WORDS + "'time'"),
 }
 
@@ -161,6 +176,7 @@ DOUBTFUL = {
         "E,N,Ellipsoidal height,Orthometric height\n" + rows(lambda _, p: [*p, 3.5]),
         SEVERAL + "'E', 'N', 'Ellipsoidal height'",
     ),
+    "x, y and z twice": ("X,Y,Z,X,Y,Z\n" + rows(lambda _, p: [*p, 1, 2, 3]), SEVERAL + "'X', 'Y', 'Z'"),
     "degrees": (
         "Time,Latitude,Longitude,Elevation\n" + rows(lambda i, p: [i / 10, p[1], p[0], p[2]]),
         "x and y are 'Longitude' and 'Latitude', degrees beside lengths",
@@ -200,6 +216,14 @@ WRONG = {
     "two decimal marks": (
         "x;y;z\n1,5;2,5;3,5\n1.5;2,5;3,5\n",
         ":3: some numbers have a decimal comma, others a point; write all of them with a point",
+    ),
+    "the first row is damaged": (
+        "P1,5.0,?,6.0\n" + rows(lambda i, p: [f"P{i}", *p]),
+        ":1: x is 'P1', not a number; write numbers like -1.5 or 2e-3",
+    ),
+    "rows of words differ": (
+        "A 1 2 3\nB 1 2 3 4\n",
+        ":2: expected 4 columns, found 5; give every row the same columns",
     ),
     "thousands": ("x;y;z\n1.234,5;2,5;3,5\n", ":2: x is '1.234,5', not a number; write numbers like -1.5 or 2e-3"),
     "no y in one row": ("x,y,z\n1,2,3\n4,,6\n", ":3: y is empty; write numbers like -1.5 or 2e-3"),
