@@ -1,4 +1,8 @@
-"""Inputs from disk or standard input, opened once, measured and hashed before they are read."""
+"""Inputs from disk or standard input, copied to an unnamed file and hashed before they are read.
+
+The bytes that are read are those that were hashed, whatever happens to the file in the meantime. A file that is cut off
+while it is mapped into memory would kill the process; nobody else can cut off the copy.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,10 @@ import os
 import stat
 import sys
 import tempfile
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, BinaryIO, NoReturn
+from typing import IO, TYPE_CHECKING, Any, BinaryIO, NoReturn, cast
 
 from cylx.errors import InputError
 
@@ -20,6 +24,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 _BLOCK = 1 << 20
+_CHANGED_REMEDY = "run it again when nothing writes to it"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,18 +59,23 @@ class Input:
 
 @contextmanager
 def open_input(path: str | Path) -> Iterator[Input]:
-    """Open a file, a pipe or standard input (`-`); inputs that cannot seek are copied to an unnamed file first.
+    """Open a copy of a file, a pipe or standard input (`-`).
 
     Raises
     ------
     InputError
-        If it does not exist, is empty, or cannot be read.
+        If it does not exist, is empty, cannot be read, or is changed meanwhile.
     """
     place = "standard input" if str(path) == "-" else printable(path)
     with _open(path, place) as stream:
         try:
             if str(path) != "-" and stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                yield Input(place, stream, *_measure(stream, place), path=Path(path))
+                with _unnamed() as copy:
+                    before = _stamp(os.fstat(stream.fileno()))
+                    size, digest = _measure(stream, place, copy)
+                    if before != _stamp(os.fstat(stream.fileno())):
+                        raise InputError(place, "was changed while it was read", _CHANGED_REMEDY)
+                    yield Input(place, copy, size, digest, path=Path(path))
                 return
             with tempfile.TemporaryFile() as copy:
                 yield Input(place, copy, *_measure(stream, place, copy))
@@ -112,8 +122,47 @@ def sha256_of(path: str | Path) -> str:
     InputError
         If it cannot be read, or is empty.
     """
-    with open_input(path) as source:
-        return source.sha256
+    place = "standard input" if str(path) == "-" else printable(path)
+    with _open(path, place) as stream:
+        try:
+            return _measure(stream, place)[1]
+        except OSError as error:
+            _refuse_os_error(place, error)
+
+
+def stamp_of(path: str | Path) -> tuple[int, ...] | None:
+    """Return what tells whether a file has been changed; None if there is none, or for standard input."""
+    try:
+        return None if str(path) == "-" else _stamp(Path(path).stat())
+    except (OSError, ValueError):
+        return None
+
+
+def check_unchanged(path: str | Path, before: tuple[int, ...] | None, sha256: str | None) -> None:
+    """Check that a file still has the bytes that were read; one that has been removed cannot be mistaken.
+
+    Parameters
+    ----------
+    path : str or Path
+    before : tuple of int or None
+        What `stamp_of` said before it was read.
+    sha256 : str or None
+        The digest of the bytes that were read.
+
+    Raises
+    ------
+    InputError
+        If it has other bytes now.
+    """
+    now = stamp_of(path)
+    if before is None or now in (None, before):
+        return
+    try:
+        same = sha256_of(path) == sha256
+    except InputError:
+        same = False
+    if not same:
+        raise InputError(printable(path), "was changed while its cylinders were sought", _CHANGED_REMEDY)
 
 
 def printable(path: str | Path) -> str:
@@ -143,6 +192,18 @@ def _open(path: str | Path, place: str) -> AbstractContextManager[BinaryIO]:
         raise InputError(place, "may not be read", "ask its owner for the permission") from None
     except (OSError, ValueError) as error:
         _refuse_os_error(place, error)
+
+
+def _unnamed() -> BinaryIO:
+    """Open an unnamed file in memory, or on disk where the system has none in memory."""
+    if sys.platform == "linux":
+        with suppress(OSError):
+            return os.fdopen(os.memfd_create("cylx"), "w+b")
+    return cast("BinaryIO", tempfile.TemporaryFile())
+
+
+def _stamp(status: os.stat_result) -> tuple[int, ...]:
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
 def _measure(stream: BinaryIO, place: str, copy: IO[bytes] | None = None) -> tuple[int, str]:

@@ -60,10 +60,11 @@ class Run:
         import_numba_without_blas()
         from cylx.api.warmup import compile_kernels
         from cylx.io import read_cloud
+        from cylx.io.inputs import check_unchanged, stamp_of
         from cylx.pipeline import extract_cylinders
         from cylx.scene import select
 
-        stopwatch = Stopwatch(job.scan)
+        stopwatch, stamp = Stopwatch(job.scan), stamp_of(job.scan)
         with self.messages.progress() as display:
             observer = Observers(display, stopwatch)
             with observed(observer, "reading"):
@@ -71,6 +72,7 @@ class Run:
             check_format(job, cloud)
             compile_kernels(observer)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
+            check_unchanged(job.scan, stamp, cloud.source.sha256)
             with observed(observer, "writing"):
                 remarks = write_job(job, extraction, overwrite=self.overwrite)
         found = len(extraction.cylinders)
