@@ -17,7 +17,8 @@ import numpy as np
 from cylx.config import Config
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
-from cylx.geometry.kernels import folder_of, is_kept, times_compiled
+from cylx.geometry.kernels import at_each_kernel as at_each_kernel
+from cylx.geometry.kernels import damaged_files, folder_of, is_kept, times_compiled
 from cylx.geometry.morton import find_cell, morton_codes
 from cylx.pipeline import extract_cylinders
 from cylx.pipeline.assembly import assemble
@@ -55,6 +56,11 @@ def kernel_folder() -> str | None:
 def kernels_are_kept() -> bool:
     """Return whether compiled kernels can be saved for the next run."""
     return is_kept(find_cell)
+
+
+def damaged_kernels() -> list[str]:
+    """Return the names of damaged files among the kept kernels; they are compiled again."""
+    return damaged_files()
 
 
 def practice_cloud() -> FloatArray:

@@ -56,7 +56,7 @@ def doctor(*, as_json: bool) -> None:
     works = all(check.state == "ok" for check in checks if check.needed)
     if as_json:
         content = {"works": works, "checks": [asdict(check) for check in checks]}
-        answer(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+        answer(json.dumps(content, indent=2, ensure_ascii=False) + "\n", as_json=True)
     else:
         show_table(["what", "state", "detail", "remedy"], [[c.name, c.state, c.detail, c.remedy] for c in checks])
         answer("cylinders can be found\n" if works else "cylinders cannot be found: see what is missing or broken\n")
@@ -153,10 +153,9 @@ def check_kernels() -> Check:
     source = f"NUMBA_CACHE_DIR={told}" if told else "NUMBA_CACHE_DIR is not set"
     remedy = "set NUMBA_CACHE_DIR to a writable folder"
     try:
-        from cylx.api.warmup import kernel_folder, kernels_are_cold, kernels_are_kept
-        from cylx.geometry.kernels import damaged_files
+        from cylx.api.warmup import damaged_kernels, kernel_folder, kernels_are_cold, kernels_are_kept
 
-        folder, damaged = kernel_folder(), damaged_files()
+        folder, damaged = kernel_folder(), damaged_kernels()
         cold = kernels_are_cold()
     except (ImportError, OSError, RuntimeError) as error:
         return Check("kernels", "broken", f"{_first_line(error)}; {source}", remedy)

@@ -18,10 +18,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-from numba.core import config
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator
-from numba.core.serialize import dumps
+_disabled = os.environ.pop("NUMBA_DISABLE_JIT", None)  # read when Numba is imported, and of no use here
+import numba  # noqa: E402
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator  # noqa: E402
+from numba.core.serialize import dumps  # noqa: E402
+
+if _disabled is not None:
+    os.environ["NUMBA_DISABLE_JIT"] = _disabled
 
 SUFFIX = ".nbc"
 _MAGIC = b"cylx kernel 1\n"
@@ -41,7 +44,7 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 def njit(**options: Any) -> Callable[[Kernel], Kernel]:  # noqa: ANN401  Numba has no types
     """Return Numba's decorator, with the cache of this module in place of Numba's.
 
-    `NUMBA_DISABLE_JIT` does not count here: without compiling, a scan would take days.
+    `NUMBA_DISABLE_JIT` does not count: without compiling, a scan would take days.
 
     Parameters
     ----------
@@ -52,11 +55,9 @@ def njit(**options: Any) -> Callable[[Kernel], Kernel]:  # noqa: ANN401  Numba h
         raise ValueError("every kernel is kept")
 
     def compiled(function: Callable[..., Any]) -> Any:  # noqa: ANN401  Numba has no types
-        disabled, config.DISABLE_JIT = config.DISABLE_JIT, 0
-        try:
-            dispatcher = numba.njit(**options)(function)
-        finally:
-            config.DISABLE_JIT = disabled
+        dispatcher = numba.njit(**options)(function)
+        if dispatcher is function:
+            raise RuntimeError("Numba was imported with NUMBA_DISABLE_JIT set, and cylx needs it to compile: unset it")
         with contextlib.suppress(RuntimeError):  # no source file: nothing is kept
             dispatcher._cache = KernelCache(function, options)
         return dispatcher
@@ -66,7 +67,7 @@ def njit(**options: Any) -> Callable[[Kernel], Kernel]:  # noqa: ANN401  Numba h
 
 def at_each_kernel(call: Callable[[], None]) -> None:
     """Call a function before each kernel is loaded or compiled, for example to notice Ctrl-C."""
-    _checkpoints.append(call)
+    _checkpoints[:] = [call]
 
 
 def folder_of(kernel: Any) -> str | None:  # noqa: ANN401  a dispatcher of Numba

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
 STREAM = "-"
-_STDOUT = (STREAM, "/dev/stdout")
+STANDARD_OUTPUT = (STREAM, "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
 
 
 def check_writable(path: str | Path, *, overwrite: bool) -> None:
@@ -37,7 +37,7 @@ def check_writable(path: str | Path, *, overwrite: bool) -> None:
     OutputError
         If the output exists, is a folder, or its folder is missing or cannot be written to.
     """
-    if str(path) in _STDOUT:
+    if str(path) in STANDARD_OUTPUT:
         if sys.stdout is None:
             raise OutputError("standard output", "is closed", "give a file name")
         return
@@ -77,7 +77,7 @@ def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
     if not is_staged(path):
         check_writable(path, overwrite=overwrite)
     try:
-        if str(path) in _STDOUT:
+        if str(path) in STANDARD_OUTPUT:
             sys.stdout.flush()  # earlier output comes first
             yield sys.stdout.buffer
             sys.stdout.buffer.flush()
@@ -91,7 +91,7 @@ def open_output(path: str | Path, *, overwrite: bool) -> Iterator[BinaryIO]:
     except BrokenPipeError:
         raise
     except OSError as error:
-        _refuse_os_error("standard output" if str(path) in _STDOUT else known_name(path), error)
+        _refuse_os_error("standard output" if str(path) in STANDARD_OUTPUT else known_name(path), error)
 
 
 def write_bytes(path: str | Path, data: bytes, *, overwrite: bool = False) -> None:

@@ -84,7 +84,7 @@ def test_kernels_that_cannot_be_kept_are_told_of(monkeypatch, tmp_path):
 
 
 def test_damaged_kernels_are_named(monkeypatch):
-    monkeypatch.setattr("cylx.geometry.kernels.damaged_files", lambda: ["a.nbc", "b.nbc", "c.nbc", "d.nbc"])
+    monkeypatch.setattr("cylx.api.warmup.damaged_kernels", lambda: ["a.nbc", "b.nbc", "c.nbc", "d.nbc"])
     check = doctor.check_kernels()
     assert (check.state, check.needed) == ("broken", False)
     assert check.detail.startswith("4 damaged in ")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cylx.errors import OutputError, UsageError
-from cylx.io.outputs import STREAM, all_or_none
+from cylx.io.outputs import STANDARD_OUTPUT, STREAM, all_or_none
 
 if TYPE_CHECKING:
     from cylx.records import Extraction, PointCloud
@@ -96,7 +96,7 @@ def plan_jobs(
         If two outputs, or an output and an input, are the same file, or an output has no name.
     """
     names = (output, annotated, rejected, report, picture)
-    output, annotated, rejected, report, picture = (STREAM if name == "/dev/stdout" else name for name in names)
+    output, annotated, rejected, report, picture = (STREAM if name in STANDARD_OUTPUT else name for name in names)
     if len(scans) > 1:
         folders = {"--rejected": rejected, "--report": report, "--png": picture, "--mesh": mesh}
         _check_batch(scans, output, annotated, folders)

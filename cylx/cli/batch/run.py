@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cylx.cli.batch.jobs import Job, check_format, write_job
 from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_outcome
+from cylx.cli.terminal.signals import Listener, check_heard
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
 
 if TYPE_CHECKING:
@@ -58,15 +59,16 @@ class Run:
 
         collect_rarely()
         import_numba_without_blas()
-        from cylx.api.warmup import compile_kernels
+        from cylx.api.warmup import at_each_kernel, compile_kernels
         from cylx.io import read_cloud
         from cylx.io.inputs import check_unchanged, stamp_of
         from cylx.pipeline import extract_cylinders
         from cylx.scene import select
 
+        at_each_kernel(check_heard)
         stopwatch, stamp = Stopwatch(job.scan), stamp_of(job.scan)
         with self.messages.progress() as display:
-            observer = Observers(display, stopwatch)
+            observer = Observers(Listener(), display, stopwatch)
             with observed(observer, "reading"):
                 cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
             check_format(job, cloud)

@@ -9,10 +9,12 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from types import TracebackType
 
 import click
 
+from cylx.cli.terminal.signals import Ended, heard
 from cylx.errors import CylxError, InputError, OutputError
 
 DEBUG = "cylx.debug"  # key in the context's meta
@@ -41,7 +43,9 @@ class Failures:
     ) -> None:
         unwritten = flush_answer()
         if failure is None or isinstance(failure, _PASSED_ON):
-            failure = unwritten
+            failure = failure if isinstance(failure, Ended) else heard() or unwritten
+            if isinstance(failure, Ended):
+                raise failure
         elif isinstance(failure, OSError) and _raised_by_click(trace):
             failure = failure if isinstance(failure, BrokenPipeError) else _unwritten(failure)
         if failure is None:
@@ -79,18 +83,28 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
         return "cylx: interrupted", INTERRUPTED
     if isinstance(failure, MemoryError):
         return "cylx: out of memory; thin the scan, or cut it into parts", UNUSABLE
+    if isinstance(failure, FileNotFoundError) and failure.filename is None and _nowhere():
+        return "cylx: the working folder has been removed; change to another folder", UNUSABLE
     what = _one_line(f"{type(failure).__name__}: {failure}")
     return f"cylx: this is a bug of cylx: {what}; run it again with --debug for the traceback to report", BUG
 
 
 def tell(line: str) -> None:
-    """Print a line on standard error; ignore it if standard error is closed."""
-    with contextlib.suppress(OSError):
+    """Print a line on standard error; if nobody can read it, do without it and all that follow."""
+    try:
         click.echo(line, err=True)
+    except OSError:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115  open until the end
 
 
-def answer(text: str) -> None:
+def answer(text: str, *, as_json: bool = False) -> None:
     """Write the answer, or a part of it, to standard output.
+
+    Parameters
+    ----------
+    text : str
+    as_json : bool
+        Whether it is JSON, which is UTF-8 whatever the encoding of the terminal.
 
     Raises
     ------
@@ -103,6 +117,10 @@ def answer(text: str) -> None:
         raise OutputError("standard output", "is closed", "open it, or write to a file")
     encoding = sys.stdout.encoding or "utf-8"
     try:
+        if as_json and (raw := getattr(sys.stdout, "buffer", None)) is not None:
+            sys.stdout.flush()
+            raw.write(text.encode("utf-8", "backslashreplace"))
+            return
         click.echo(text.encode(encoding, "backslashreplace").decode(encoding), nl=False)
     except BrokenPipeError:
         raise
@@ -139,6 +157,14 @@ def flush_answer() -> BrokenPipeError | OutputError | None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return error if isinstance(error, BrokenPipeError) else _unwritten(error)
     return None
+
+
+def _nowhere() -> bool:
+    """Return whether the working folder has been removed."""
+    try:
+        return not Path.cwd()
+    except FileNotFoundError:
+        return True
 
 
 def _raised_by_click(trace: TracebackType | None) -> bool:
