@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
@@ -17,8 +17,7 @@ import numpy as np
 from cylx.config import Config
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
-from cylx.geometry.kernels import at_each_kernel as at_each_kernel
-from cylx.geometry.kernels import damaged_files, folder_of, is_kept, times_compiled
+from cylx.geometry.kernels import at_each_kernel, damaged_files, folder_of, is_kept, times_compiled
 from cylx.geometry.morton import find_cell, morton_codes
 from cylx.pipeline import extract_cylinders
 from cylx.pipeline.assembly import assemble
@@ -39,6 +38,11 @@ def compile_kernels(observer: Observer) -> None:
     if kernels_are_cold():
         with StageLog(observer).stage("compiling"), second_process() if kernels_are_kept() else nullcontext():
             extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
+
+
+def ask_between_kernels(call: Callable[[], None]) -> None:
+    """Call a function before each kernel is loaded or compiled, for example to notice Ctrl-C."""
+    at_each_kernel(call)
 
 
 def kernels_are_cold() -> bool:

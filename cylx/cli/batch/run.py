@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cylx.cli.batch.jobs import Job, check_format, write_job
 from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_outcome
+from cylx.cli.terminal.failures import blamed_on
 from cylx.cli.terminal.signals import Listener, check_heard
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
 
@@ -59,13 +60,13 @@ class Run:
 
         collect_rarely()
         import_numba_without_blas()
-        from cylx.api.warmup import at_each_kernel, compile_kernels
+        from cylx.api.warmup import ask_between_kernels, compile_kernels
         from cylx.io import read_cloud
         from cylx.io.inputs import check_unchanged, stamp_of
         from cylx.pipeline import extract_cylinders
         from cylx.scene import select
 
-        at_each_kernel(check_heard)
+        ask_between_kernels(check_heard)
         stopwatch, stamp = Stopwatch(job.scan), stamp_of(job.scan)
         with self.messages.progress() as display:
             observer = Observers(Listener(), display, stopwatch)
@@ -89,7 +90,8 @@ def attempt(run: Run, debug: bool, job: Job) -> Outcome:
     """Process a scan and return the outcome; a failure does not stop the other scans."""
     finished = None
     try:
-        finished = run.extract_one(job)
+        with blamed_on(job.scan):
+            finished = run.extract_one(job)
         check_required(job, finished.cylinders, run.require)
     except Exception as failure:  # noqa: BLE001  reported with exit code and traceback; a bug is reported as a bug
         return failed_outcome(failure, finished, debug=debug)

@@ -20,7 +20,45 @@ from cylx.errors import CylxError, InputError, OutputError
 DEBUG = "cylx.debug"  # key in the context's meta
 BUG, USAGE, UNUSABLE, INTERRUPTED, READER_GONE = 1, 2, 3, 130, 141
 
+_MOST_NAMES = 3
 _PASSED_ON = (click.exceptions.Exit, SystemExit, GeneratorExit)
+
+
+class UnforeseenError(Exception):
+    """A failure that no error of ours describes, with the file that it is about.
+
+    Parameters
+    ----------
+    place : str
+        The file, or several.
+    failure : Exception
+        What went wrong.
+    """
+
+    def __init__(self, place: str, failure: Exception) -> None:
+        super().__init__(place, failure)
+        self.place = place
+        self.failure = failure
+
+
+@contextmanager
+def blamed_on(*files: str) -> Iterator[None]:
+    """Name the files in the line about a failure that no error of ours describes.
+
+    Raises
+    ------
+    UnforeseenError
+        In place of such a failure.
+    """
+    try:
+        yield
+    except (CylxError, click.ClickException, click.Abort, click.exceptions.Exit, BrokenPipeError, UnforeseenError):
+        raise
+    except Exception as failure:
+        names = [_one_line(str(file)) for file in files[:_MOST_NAMES]] + ["…"] * (len(files) > _MOST_NAMES)
+        if not names:
+            raise
+        raise UnforeseenError(", ".join(names), failure) from failure
 
 
 class Failures:
@@ -73,6 +111,9 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     code : int
         The exit code.
     """
+    place = ""
+    if isinstance(failure, UnforeseenError):
+        place, failure = failure.place, failure.failure
     if isinstance(failure, CylxError):
         return _one_line(f"cylx: {failure}"), failure.exit_code
     if isinstance(failure, click.ClickException):
@@ -82,11 +123,12 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     if isinstance(failure, KeyboardInterrupt | click.Abort):
         return "cylx: interrupted", INTERRUPTED
     if isinstance(failure, MemoryError):
-        return "cylx: out of memory; thin the scan, or cut it into parts", UNUSABLE
+        return f"cylx: {place}{': ' if place else ''}out of memory; thin the scan, or cut it into parts", UNUSABLE
     if isinstance(failure, FileNotFoundError) and failure.filename is None and _nowhere():
         return "cylx: the working folder has been removed; change to another folder", UNUSABLE
     what = _one_line(f"{type(failure).__name__}: {failure}")
-    return f"cylx: this is a bug of cylx: {what}; run it again with --debug for the traceback to report", BUG
+    remedy = "run it again with --debug for the traceback to report" + (f"; the input was {place}" if place else "")
+    return f"cylx: this is a bug of cylx: {what}; {remedy}", BUG
 
 
 def tell(line: str) -> None:
