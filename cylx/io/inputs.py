@@ -27,6 +27,10 @@ _BLOCK = 1 << 20
 _CHANGED_REMEDY = "run it again when nothing writes to it"
 
 
+class _NoRoomError(OSError):
+    """There is no room for a copy."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Input:
     """A file that can be read from any position.
@@ -70,11 +74,7 @@ def open_input(path: str | Path) -> Iterator[Input]:
     with _open(path, place) as stream:
         try:
             if str(path) != "-" and stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-                with _unnamed() as copy:
-                    before = _stamp(os.fstat(stream.fileno()))
-                    size, digest = _measure(stream, place, copy)
-                    if before != _stamp(os.fstat(stream.fileno())):
-                        raise InputError(place, "was changed while it was read", _CHANGED_REMEDY)
+                with _copied(stream, place) as (copy, size, digest):
                     yield Input(place, copy, size, digest, path=Path(path))
                 return
             with tempfile.TemporaryFile() as copy:
@@ -194,6 +194,21 @@ def _open(path: str | Path, place: str) -> AbstractContextManager[BinaryIO]:
         _refuse_os_error(place, error)
 
 
+@contextmanager
+def _copied(stream: BinaryIO, place: str) -> Iterator[tuple[BinaryIO, int, str]]:
+    """Yield a copy of a file, its size and its digest; the file itself if there is no room for a copy."""
+    before = _stamp(os.fstat(stream.fileno()))
+    with _unnamed() as copy:
+        try:
+            chosen, measured = copy, _measure(stream, place, copy)
+        except _NoRoomError:
+            stream.seek(0)
+            chosen, measured = stream, _measure(stream, place)
+        if before != _stamp(os.fstat(stream.fileno())):
+            raise InputError(place, "was changed while it was read", _CHANGED_REMEDY)
+        yield chosen, *measured
+
+
 def _unnamed() -> BinaryIO:
     """Open an unnamed file in memory, or on disk where the system has none in memory."""
     if sys.platform == "linux":
@@ -212,12 +227,18 @@ def _measure(stream: BinaryIO, place: str, copy: IO[bytes] | None = None) -> tup
         digest.update(block)
         size += len(block)
         if copy is not None:
-            copy.write(block)
-    if copy is not None:
-        copy.flush()
+            _write(copy, block)
     if size == 0:
         raise InputError(place, "is empty", "check how it was made")
     return size, digest.hexdigest()
+
+
+def _write(copy: IO[bytes], block: bytes) -> None:
+    try:
+        copy.write(block)
+        copy.flush()
+    except OSError as error:
+        raise _NoRoomError(*error.args) from error
 
 
 def _refuse_os_error(place: str, error: OSError | ValueError) -> NoReturn:
