@@ -202,6 +202,8 @@ def _copied(stream: BinaryIO, place: str) -> Iterator[tuple[BinaryIO, int, str]]
         try:
             chosen, measured = copy, _measure(stream, place, copy)
         except _NoRoomError:
+            with suppress(OSError):  # of what is still in its buffer
+                copy.close()
             stream.seek(0)
             chosen, measured = stream, _measure(stream, place)
         if before != _stamp(os.fstat(stream.fileno())):

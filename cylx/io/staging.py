@@ -75,17 +75,23 @@ class Group:
     def __init__(self) -> None:
         self._done: list[tuple[Path, Path | None]] = []
 
-    def keep(self, target: Path) -> None:
-        """Remember an output before it takes its name, and the file that it replaces."""
-        old = temporary_beside(target, ".old")
+    def replace(self, temporary: Path, target: Path) -> None:
+        """Give a file its name, and keep the file that it replaces for a while."""
+        old: Path | None = temporary_beside(target, ".old")
         try:
-            os.link(target, old)
+            os.link(target, old)  # type: ignore[arg-type]
         except FileNotFoundError:
-            self._done.append((target, None))
+            old = None
         except OSError:  # the file system has no links: what is replaced cannot be put back
-            pass
-        else:
-            self._done.append((target, old))
+            temporary.replace(target)
+            return
+        try:
+            temporary.replace(target)
+        except BaseException:
+            if old is not None:
+                old.unlink(missing_ok=True)
+            raise
+        self._done.append((target, old))
 
     def made(self, target: Path) -> None:
         """Remember an output that replaced nothing."""
@@ -97,7 +103,6 @@ class Group:
             with contextlib.suppress(OSError):
                 if old is not None:
                     old.replace(target)
-                    old.unlink(missing_ok=True)  # a file is not renamed to a link to itself
                 else:
                     target.unlink(missing_ok=True)
         self._done = []
@@ -158,8 +163,9 @@ def _publish(temporary: Path, target: Path, name: str, *, overwrite: bool, group
     """Give a complete file its name."""
     if overwrite:
         if group is not None:
-            group.keep(target)
-        temporary.replace(target)
+            group.replace(temporary, target)
+        else:
+            temporary.replace(target)
         return
     try:
         _link(temporary, target)
