@@ -6,22 +6,32 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from hypothesis import settings
 
-# where a red run costs most the examples are the same ones every time; everywhere else they are new ones
-settings.register_profile("ci", derandomize=True, deadline=None)
-settings.register_profile("anew", deadline=None)
-settings.load_profile("ci" if os.environ.get("CI") else "anew")
+# the examples are the same in every run; `pytest --hypothesis-profile search` looks for others, and for longer
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("search", max_examples=1000, deadline=None)
+settings.load_profile("same")
 
-# two processes that compile one kernel at the same moment may mix up what they keep of it: each worker keeps its own
-if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).resolve().parents[1] / ".pytest_cache" / "kernels" / worker)
+# a worker for each core, and no more threads: small matrices take twice as long where threads wait for one another
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+KERNELS = Path(__file__).resolve().parents[1] / ".pytest_cache" / "kernels"
+os.environ["NUMBA_CACHE_DIR"] = str(KERNELS)
+
+import numpy as np  # noqa: E402  reads the number of threads
 
 CIRCLE = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 POINTS = np.round(np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE), np.arange(24) % 5]), 6)
+
+
+def pytest_sessionstart(session):
+    """Compile the kernels once where several workers would each compile them."""
+    if (getattr(session.config.option, "numprocesses", None) or 0) > 1 and not hasattr(session.config, "workerinput"):
+        code = "from cylx.api.warmup import *; compile_kernels(SilentObserver())"
+        subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).resolve().parents[1], check=False)
 
 
 def pytest_addoption(parser):

@@ -51,7 +51,7 @@ def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
     with called_by_file({"a": a, "b": b}):
         comparison = compare(*documents, tolerances=Tolerances(**tolerances))
     if as_json:
-        answer(json.dumps(comparison.to_dict(), indent=2) + "\n")
+        answer(json.dumps(comparison.to_dict(), indent=2) + "\n", as_json=True)
     elif comparison.differences:
         header = ["what", "id in A", "id in B", "of", "A", "B", "difference", "tolerance"]
         show_table(header, [_row(difference) for difference in comparison.differences])

@@ -58,7 +58,7 @@ def evaluate(
         outcome = evaluation.evaluate(*documents, angle_deg=angle_deg, offset=offset, radius=radius)
     missed = list(missed_bars(outcome, bars))
     if as_json:
-        answer(json.dumps({**outcome.to_dict(), "bars_missed": missed}, indent=2) + "\n")
+        answer(json.dumps({**outcome.to_dict(), "bars_missed": missed}, indent=2) + "\n", as_json=True)
     else:
         answer(as_text(outcome))
     for line in missed:

@@ -66,7 +66,7 @@ def export(
     write_together({name: exported.data for name, exported in written.items()}, overwrite=overwrite)
     _report(result, drawing, written)
     if as_json:
-        answer(json.dumps(_told(result, drawing, written), indent=2, ensure_ascii=False) + "\n")
+        answer(json.dumps(_told(result, drawing, written), indent=2, ensure_ascii=False) + "\n", as_json=True)
 
 
 def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[str, Any]:

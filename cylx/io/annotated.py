@@ -12,11 +12,12 @@ import numpy as np
 
 from cylx.errors import OutputError
 from cylx.io.formats import LAS_SUFFIXES
-from cylx.io.inputs import excerpt, printable
+from cylx.io.inputs import excerpt
 from cylx.io.names import mended_names
 from cylx.io.outputs import open_output
 from cylx.io.pcd import write_pcd
 from cylx.io.ply import ROWS_AT_A_TIME, ply_type, write_ply
+from cylx.io.staging import known_name
 from cylx.palette import cylinder_colors
 
 if TYPE_CHECKING:
@@ -88,16 +89,16 @@ def check_annotated(path: str | Path, cloud: PointCloud) -> None:
     """
     suffix = Path(path).suffix.lower()
     if suffix in LAS_SUFFIXES and (cloud.source.header is None or cloud.table is None):
-        raise OutputError(printable(path), "the input is neither LAS nor LAZ", "choose a name that ends in .ply")
+        raise OutputError(known_name(path), "the input is neither LAS nor LAZ", "choose a name that ends in .ply")
     obstacle = las_obstacle(path, cloud)
     if obstacle:
-        raise OutputError(printable(path), obstacle, "choose a name that ends in .ply")
+        raise OutputError(known_name(path), obstacle, "choose a name that ends in .ply")
     if suffix == ".pcd" and cloud.table is not None:
         dtype = cloud.table.dtype
         lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
         if lists:
             fault = f"PCD cannot hold the list property {excerpt(lists[0])}"
-            raise OutputError(printable(path), fault, "choose a name that ends in .ply")
+            raise OutputError(known_name(path), fault, "choose a name that ends in .ply")
 
 
 def las_obstacle(path: str | Path, cloud: PointCloud) -> str:

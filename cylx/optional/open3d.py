@@ -46,6 +46,8 @@ def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
     ImportError
         If open3d is not installed, or does not run here.
     """
+    if not _is_somewhere():
+        os.chdir(os.sep)  # a library of open3d ends the process where the working folder has been removed
     with contextlib.suppress(ImportError, OSError):
         import libusb_package  # noqa: PLC0415  not everywhere
 
@@ -54,6 +56,13 @@ def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
         warnings.simplefilter("ignore")
         import open3d  # noqa: PLC0415  takes a second
     return open3d
+
+
+def _is_somewhere() -> bool:
+    try:
+        return bool(Path.cwd())
+    except FileNotFoundError:
+        return False
 
 
 def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | None:

@@ -20,6 +20,7 @@ from cylx.cli.batch.run import attempt
 from cylx.cli.batch.summary import LIST, is_own_table, list_text, table_text
 from cylx.cli.terminal.display import Messages, show_table
 from cylx.cli.terminal.failures import DEBUG, tell
+from cylx.cli.terminal.signals import check_heard
 from cylx.cli.terminal.stopwatch import peak_memory
 from cylx.errors import BatchError, NothingFoundError, OutputError
 
@@ -89,6 +90,7 @@ class Batch:
         started = perf_counter()
         with self.run.messages.counting(len(self.jobs)) as advance:
             for index, outcome in self._outcomes():
+                check_heard()
                 self.outcomes[index] = outcome
                 self._show(self.jobs[index], outcome)
                 advance()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cylx.errors import OutputError, UsageError
-from cylx.io.outputs import STREAM, moved_at_the_end
+from cylx.io.outputs import STANDARD_OUTPUT, STREAM, all_or_none
 
 if TYPE_CHECKING:
     from cylx.records import Extraction
@@ -97,7 +96,7 @@ def plan_jobs(
         If two outputs, or an output and an input, are the same file, or an output has no name.
     """
     names = (output, annotated, rejected, report, picture)
-    output, annotated, rejected, report, picture = (STREAM if name == "/dev/stdout" else name for name in names)
+    output, annotated, rejected, report, picture = (STREAM if name in STANDARD_OUTPUT else name for name in names)
     if len(scans) > 1:
         folders = {"--rejected": rejected, "--report": report, "--png": picture, "--mesh": mesh}
         _check_batch(scans, output, annotated, folders)
@@ -184,12 +183,7 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
     content = Result.of(extraction)
     page, picture = _looks(job, extraction)
     mesh, remarks = _mesh(job, content)
-    with contextlib.ExitStack() as stack:
-
-        def staged(name: str) -> str | Path:
-            """Return the temporary name to write an output to."""
-            return stack.enter_context(moved_at_the_end(name, overwrite=overwrite))
-
+    with all_or_none(overwrite=overwrite) as staged:
         result = staged(job.result)  # renamed last: if the result exists, the other outputs do too
         if job.annotated is not None:
             write_annotated(staged(job.annotated), extraction, overwrite=overwrite)

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from cylx.cli.batch.annotated import check_format
 from cylx.cli.batch.jobs import Job, write_job
 from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_outcome
+from cylx.cli.terminal.failures import blamed_on
+from cylx.cli.terminal.signals import Listener, check_heard
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
 
 if TYPE_CHECKING:
@@ -59,19 +61,22 @@ class Run:
 
         collect_rarely()
         import_numba_without_blas()
-        from cylx.api.warmup import compile_kernels
+        from cylx.api.warmup import ask_between_kernels, compile_kernels
         from cylx.io import read_cloud
+        from cylx.io.inputs import check_unchanged, stamp_of
         from cylx.pipeline import extract_cylinders
         from cylx.scene import select
 
-        stopwatch = Stopwatch(job.scan)
+        ask_between_kernels(check_heard)
+        stopwatch, stamp = Stopwatch(job.scan), stamp_of(job.scan)
         with self.messages.progress() as display:
-            observer = Observers(display, stopwatch)
+            observer = Observers(Listener(), display, stopwatch)
             with observed(observer, "reading"):
                 cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
             job, notes = check_format(job, cloud, overwrite=self.overwrite)
             compile_kernels(observer)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
+            check_unchanged(job.scan, stamp, cloud.source.sha256)
             with observed(observer, "writing"):
                 remarks = write_job(job, extraction, overwrite=self.overwrite)
         found = len(extraction.cylinders)
@@ -89,7 +94,8 @@ def attempt(run: Run, debug: bool, job: Job) -> Outcome:
     """Process a scan and return the outcome; a failure does not stop the other scans."""
     finished = None
     try:
-        finished = run.extract_one(job)
+        with blamed_on(job.scan):
+            finished = run.extract_one(job)
         check_required(job, finished.cylinders, run.require)
     except Exception as failure:  # noqa: BLE001  reported with exit code and traceback; a bug is reported as a bug
         return failed_outcome(failure, finished, debug=debug)

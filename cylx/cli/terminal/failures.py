@@ -9,10 +9,12 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from types import TracebackType
 
 import click
 
+from cylx.cli.terminal.signals import Ended, heard
 from cylx.errors import CylxError, InputError, OutputError
 from cylx.harmless import visible
 
@@ -20,7 +22,45 @@ DEBUG = "cylx.debug"  # key in the context's meta
 BUG, USAGE, UNUSABLE, INTERRUPTED, READER_GONE = 1, 2, 3, 130, 141
 
 _LONGEST = 400
+_MOST_NAMES = 3
 _PASSED_ON = (click.exceptions.Exit, SystemExit, GeneratorExit)
+
+
+class UnforeseenError(Exception):
+    """A failure that no error of ours describes, with the file that it is about.
+
+    Parameters
+    ----------
+    place : str
+        The file, or several.
+    failure : Exception
+        What went wrong.
+    """
+
+    def __init__(self, place: str, failure: Exception) -> None:
+        super().__init__(place, failure)
+        self.place = place
+        self.failure = failure
+
+
+@contextmanager
+def blamed_on(*files: str) -> Iterator[None]:
+    """Name the files in the line about a failure that no error of ours describes.
+
+    Raises
+    ------
+    UnforeseenError
+        In place of such a failure.
+    """
+    try:
+        yield
+    except (CylxError, click.ClickException, click.Abort, click.exceptions.Exit, BrokenPipeError, UnforeseenError):
+        raise
+    except Exception as failure:
+        names = [_one_line(str(file)) for file in files[:_MOST_NAMES]] + ["…"] * (len(files) > _MOST_NAMES)
+        if not names:
+            raise
+        raise UnforeseenError(", ".join(names), failure) from failure
 
 
 class Failures:
@@ -43,7 +83,9 @@ class Failures:
     ) -> None:
         unwritten = flush_answer()
         if failure is None or isinstance(failure, _PASSED_ON):
-            failure = unwritten
+            failure = failure if isinstance(failure, Ended) else heard() or unwritten
+            if isinstance(failure, Ended):
+                raise failure
         elif isinstance(failure, OSError) and _raised_by_click(trace):
             failure = failure if isinstance(failure, BrokenPipeError) else _unwritten(failure)
         if failure is None:
@@ -71,6 +113,9 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     code : int
         The exit code.
     """
+    place = ""
+    if isinstance(failure, UnforeseenError):
+        place, failure = failure.place, failure.failure
     if isinstance(failure, CylxError):
         return _one_line(f"cylx: {failure}"), failure.exit_code
     if isinstance(failure, click.ClickException):
@@ -80,13 +125,16 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     if isinstance(failure, KeyboardInterrupt | click.Abort):
         return "cylx: interrupted", INTERRUPTED
     if isinstance(failure, MemoryError):
-        return "cylx: out of memory; thin the scan, or cut it into parts", UNUSABLE
+        return f"cylx: {place}{': ' if place else ''}out of memory; thin the scan, or cut it into parts", UNUSABLE
+    if isinstance(failure, FileNotFoundError) and failure.filename is None and _nowhere():
+        return "cylx: the working folder has been removed; change to another folder", UNUSABLE
     what = _one_line(f"{type(failure).__name__}: {failure}")
-    return f"cylx: this is a bug of cylx: {what}; run it again with --debug for the traceback to report", BUG
+    remedy = "run it again with --debug for the traceback to report" + (f"; the input was {place}" if place else "")
+    return f"cylx: this is a bug of cylx: {what}; {remedy}", BUG
 
 
 def tell(text: str, *, lines: bool = False, styled: bool = False) -> None:
-    """Print a line on standard error; ignore it if standard error is closed.
+    """Print a line on standard error; if nobody can read it, do without it and all that follow.
 
     Parameters
     ----------
@@ -97,17 +145,21 @@ def tell(text: str, *, lines: bool = False, styled: bool = False) -> None:
     styled : bool
         Whether it has commands for the terminal, and nothing of others that is not escaped already.
     """
-    with contextlib.suppress(OSError):
+    try:
         click.echo(text if styled else visible(text, keep="\n\t" if lines else ""), err=True)
+    except OSError:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115  open until the end
 
 
-def answer(text: str, *, styled: bool = False) -> None:
+def answer(text: str, *, as_json: bool = False, styled: bool = False) -> None:
     """Write the answer, or a part of it, to standard output.
 
     Parameters
     ----------
     text : str
         Lines; other characters that do not print are escaped.
+    as_json : bool
+        Whether it is JSON, which is UTF-8 whatever the encoding of the terminal.
     styled : bool
         Whether it has commands for the terminal, and nothing of others that is not escaped already.
 
@@ -123,6 +175,10 @@ def answer(text: str, *, styled: bool = False) -> None:
     text = text if styled else visible(text, keep="\n\t")
     encoding = sys.stdout.encoding or "utf-8"
     try:
+        if as_json and (raw := getattr(sys.stdout, "buffer", None)) is not None:
+            sys.stdout.flush()
+            raw.write(text.encode("utf-8", "backslashreplace"))
+            return
         click.echo(text.encode(encoding, "backslashreplace").decode(encoding), nl=False)
     except BrokenPipeError:
         raise
@@ -159,6 +215,14 @@ def flush_answer() -> BrokenPipeError | OutputError | None:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return error if isinstance(error, BrokenPipeError) else _unwritten(error)
     return None
+
+
+def _nowhere() -> bool:
+    """Return whether the working folder has been removed."""
+    try:
+        return not Path.cwd()
+    except FileNotFoundError:
+        return True
 
 
 def _raised_by_click(trace: TracebackType | None) -> bool:
