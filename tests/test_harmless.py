@@ -69,3 +69,30 @@ def test_the_table_of_many_scans_is_harmless():
     assert found["file"] == "'=1+1\"\n.ply"
     assert found["catalogue_name"] == "'=cmd|' /C calc'!A0"
     assert found["axis_point_z"] == "-1.0"
+
+
+def test_an_exported_table_is_harmless(tmp_path, make_extraction, run_cylx):
+    from cylx.results import Result
+
+    content = Result.of(make_extraction()).to_object()
+    content["input"]["file"] = NASTY
+    for cylinder in content["cylinders"]:
+        cylinder["evidence"] = {"=1+1": 0.5, "-plain": -1.0}
+    (tmp_path / "r.json").write_text(json.dumps(content))
+    done = run_cylx("export", tmp_path / "r.json", tmp_path / "r.csv")
+    assert done.exit_code == 0, done.stderr
+    header, *rows = csv.reader(io.StringIO((tmp_path / "r.csv").read_text()))
+    assert not [name for name in header if name[0] in "=+-@"]
+    assert rows[0][header.index("evidence_-plain")] == "-1.0"
+
+
+def test_names_reach_the_terminal_escaped(tmp_path, monkeypatch, run_cylx):
+    monkeypatch.chdir(tmp_path)
+    name = "a\x1b]0;owned\x07\u009b31m\u202egpj.xyz"
+    (tmp_path / name).write_text("".join(f"{x} {x * x % 7} {x % 3}\n" for x in range(40)))
+    for options in ([], ["--json"]):
+        shown = run_cylx("info", name, *options)
+        assert shown.exit_code == 0
+        for text in (shown.stdout, shown.stderr):
+            assert text.replace("\n", "").isprintable()
+    assert json.loads(shown.stdout)["file"] == name

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 _PAGE, _PAYLOAD = 1024, 1020  # bytes of a page, the last four of which are a checksum
 _HEADER = 48
-_DECLARATION = re.compile(rb"<\?xml\b([^?]*)\?>")
 _ENCODING = re.compile(rb"\bencoding\s*=\s*[\"']([^\"']*)[\"']")
 _ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii", "iso-8859-1")  # a byte of ASCII means the same in each
 _APART = {b"<?": b"?>", b"<!--": b"-->", b"<![CDATA[": b"]]>"}
@@ -41,12 +40,7 @@ def check_xml(source: Input) -> None:
     InputError
     """
     xml = _xml(source).removeprefix(b"\xef\xbb\xbf")
-    declaration = _DECLARATION.match(xml)
-    encoding = "utf-8"
-    if declaration is not None and b"encoding" in declaration[1]:
-        found = _ENCODING.search(declaration[1])
-        encoding = found[1].strip().lower().decode("ascii", "replace") if found else ""
-    if xml.lstrip(b" \t\r\n")[:1] != b"<" or encoding not in _ENCODINGS or not _is_text(xml, encoding):
+    if xml.lstrip(b" \t\r\n")[:1] != b"<" or not _is_text(xml, _encoding(xml)):
         raise InputError(source.place, "broken E57: its XML is no text in UTF-8", _REMEDY)
     markup = _without_comments(xml)
     if markup.lstrip()[:2] == b"<!" or _DTD.search(markup):
@@ -73,9 +67,18 @@ def _xml(source: Input) -> bytes:
     return logical[skipped : skipped + length]
 
 
+def _encoding(xml: bytes) -> str:
+    """Return the encoding that the XML declares; an empty text if it may not be used, or cannot be told for certain."""
+    declaration = xml[: xml.find(b"?>")] if xml.lstrip(b" \t\r\n").startswith(b"<?xml") else b""
+    found = [name.strip().lower().decode("ascii", "replace") for name in _ENCODING.findall(declaration)]
+    if declaration.lower().count(b"encoding") != len(found) or any(name not in _ENCODINGS for name in found):
+        return ""
+    return found[0] if found else "utf-8"
+
+
 def _is_text(xml: bytes, encoding: str) -> bool:
     try:
-        return "\0" not in xml.decode(encoding)
+        return bool(encoding) and "\0" not in xml.decode(encoding)
     except UnicodeDecodeError:
         return False
 

@@ -211,9 +211,10 @@ def _process(fds: list[int]) -> Iterator[subprocess.Popen[bytes]]:
 
 @contextmanager
 def _target() -> Iterator[IO[bytes]]:
-    """Yield an empty file for the points: in memory on Linux, else on disk."""
-    if hasattr(os, "memfd_create"):
-        with os.fdopen(os.memfd_create("cylx"), "r+b", buffering=0) as file:
+    """Yield an empty file for the points: in memory on Linux where Python can, else on disk."""
+    if _LINUX:
+        in_memory = hasattr(os, "memfd_create")  # not in all builds of Python
+        with os.fdopen(os.memfd_create("cylx"), "r+b") if in_memory else tempfile.TemporaryFile() as file:
             yield file
         return
     with tempfile.TemporaryDirectory(prefix="cylx-") as folder, (Path(folder) / "points").open("w+b") as file:

@@ -130,13 +130,13 @@ def _read(kind: str, file: BinaryIO, request: dict[str, Any], target: Target) ->
 
 def _import_libraries(kind: str) -> None:
     """Import everything before the limits count, and before anything of the file is read."""
-    with suppress(ImportError):  # the reader says it
+    with suppress(Exception):  # the reader says it
         for name in _LIBRARIES[kind]:
             import_module(name)
     if kind == "pcd":
         from cylx.optional.open3d import import_open3d
 
-        with suppress(ImportError):
+        with suppress(Exception):
             import_open3d()
 
 

@@ -103,9 +103,36 @@ def _las():
     return seeds
 
 
+def _packed():
+    """Make PCD files with compressed bodies: of literals alone, and with repetitions."""
+    import struct
+
+    import numpy as np
+
+    seeds = []
+    for points in (np.random.default_rng(0).uniform(0, 2, (3, _POINTS)), np.ones((3, _POINTS))):
+        raw = points.astype("f4").tobytes()
+        body = b"".join(bytes([len(part) - 1]) + part for part in _pieces(raw))
+        if points.std() == 0:  # four bytes, and back by four for the rest: LZF has at most 264 at a time
+            body = bytes([3]) + raw[:4] + (len(raw) - 4) // 264 * bytes([0xE0, 255, 3])
+            rest = (len(raw) - 4) % 264
+            body += bytes([0xE0, rest - 9, 3])
+        header = (
+            f"VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH {_POINTS}\nHEIGHT 1\n"
+            f"VIEWPOINT 0 0 0 1 0 0 0\nPOINTS {_POINTS}\nDATA binary_compressed\n"
+        )
+        seeds.append(header.encode() + struct.pack("<II", len(body), len(raw)) + body)
+    return seeds
+
+
+def _pieces(raw):
+    return (raw[place : place + 32] for place in range(0, len(raw), 32))
+
+
 NATIVE_TARGETS = {
     "las": (_las(), read_as("las")),
     "e57": (_e57(), read_as("e57")),
     "e57-inside": ([unpaged(seed) for seed in _e57()], read_inside_e57),
+    "pcd-packed": (_packed(), read_as("pcd")),
     "e57-xml": ([xml_of(seed) for seed in _e57()], read_e57_xml),
 }

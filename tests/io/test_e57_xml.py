@@ -74,6 +74,26 @@ def test_an_encoding_that_hides_a_doctype_is_refused(tmp_path, plain, encoding):
     assert fault_of(tmp_path, with_xml(plain, hidden + rest)) == NO_TEXT
 
 
+@pytest.mark.parametrize(
+    "declared",
+    [
+        b'<?xml version="1.0" a="?" encoding="utf-7"?>',
+        b'<?xml version="1.0" encoding="utf-8" encoding="utf-7"?>',
+        b'<?xml version="1.0" encoding=utf-7?>',
+        b'<?xml version="1.0" ENCODING="utf-7"?>',
+        b"<?xml\n version=\"1.0\"\n encoding\n=\n'utf-7'?>",
+    ],
+)
+def test_a_declaration_that_hides_its_encoding_is_refused(tmp_path, plain, declared):
+    assert fault_of(tmp_path, with_xml(plain, declared + b"+ADwAIQ-DOCTYPE a []+AD4-" + parts(plain)[1])) == NO_TEXT
+
+
+@pytest.mark.parametrize("declared", [b"", b'<?xml version="1.0"?>', b"<?xml version='1.0' encoding='utf-8' ?>"])
+def test_honest_declarations(tmp_path, plain, declared):
+    (tmp_path / "scan.e57").write_bytes(with_xml(plain, declared + parts(plain)[1]))
+    assert len(read_cloud(tmp_path / "scan.e57").points) == len(POINTS)
+
+
 @pytest.mark.parametrize("name", [b"schemaLocation", b"noNamespaceSchemaLocation"])
 def test_the_place_of_a_schema_is_refused(tmp_path, plain, name):
     declaration, rest = parts(plain)

@@ -12,7 +12,7 @@ import pytest
 
 from cylx.errors import InputError
 from cylx.io import isolated
-from cylx.io.inputs import open_input
+from cylx.io.inputs import Input, open_input
 from tests.support.kept_readers import KeptReaders
 
 LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the limits are those of Linux")
@@ -82,6 +82,23 @@ def test_points_come_back_and_prints_do_not_disturb(scan, misled):
     assert table["x"].tolist() == [7.0] * 3
 
 
+def test_files_with_names_do_where_there_are_no_others(scan, misled, monkeypatch):
+    monkeypatch.setattr(isolated, "_LINUX", False)
+    misled("t = allocate(5, np.dtype([('x', 'f8')]))\nt['x'] = len(source.head(9))\nreturn t")
+    assert read(scan)["x"].tolist() == [9.0] * 5
+    with scan.open("rb") as file:
+        source = Input("scan", file, 504, "")  # as unpacked from gzip
+        with isolated._readable(source) as copy, isolated.Reader("las", copy) as reader:
+            assert len(reader.read(source)) == 5
+
+
+@LINUX
+def test_a_file_on_disk_does_where_there_is_none_in_memory(scan, misled, monkeypatch):
+    monkeypatch.delattr(os, "memfd_create")
+    misled("t = allocate(2, np.dtype([('x', 'f8')]))\nt['x'] = 3\nreturn t")
+    assert read(scan)["x"].tolist() == [3.0] * 2
+
+
 @LINUX
 def test_the_process_has_no_network_where_the_system_permits_it(scan, misled):
     allowed = subprocess.run(["unshare", "-rn", "true"], capture_output=True, check=False).returncode == 0
@@ -103,7 +120,7 @@ from cylx.io import isolated
 sleep = "lambda *_, **__: (open({str(tmp_path / "pid")!r}, 'w').write(str(os.getpid())), time.sleep(60))"
 code = "import os, time, cylx.io.las as reader\\nreader.read_las = " + sleep + "\\nfrom cylx"
 isolated._START = isolated._START.replace("from cylx", code)
-from cylx.io.inputs import open_input
+from cylx.io.inputs import Input, open_input
 with open_input({str(scan)!r}) as source:
     isolated.read_isolated(source, "las")
 """
