@@ -132,6 +132,14 @@ TOLD = {
         "foo,bar,baz\n" + rows(),
         "the names of the columns do not tell the coordinates; x, y, z are 'foo', 'bar', 'baz'",
     ),
+    "a title that looks like names": (
+        "Laser survey yesterday\n" + rows(sep=" "),
+        "the names of the columns do not tell the coordinates; x, y, z are 'Laser', 'survey', 'yesterday'",
+    ),
+    "a letter in a title": (
+        "Plant X scan\n" + rows(sep=" "),
+        "the names of the columns do not tell the coordinates; x, y, z are 'Plant', 'X', 'scan'",
+    ),
     "a column of words": ("Point,X,Y,Z\n" + rows(lambda i, p: [f"P{i}", *p]), WORDS + "'Point'"),
     "words with separators": ("x,y,z,code\n" + rows(lambda _, p: [*p, '"tree, big"']), WORDS + "'code'"),
     "words with a #": ("x;y;z;code\n" + rows(lambda i, p: [*p, f"tree #{i}"], ";"), WORDS + "'code'"),
