@@ -242,6 +242,10 @@ WRONG = {
     ),
     "a row of one number": ("".join([*PTS[:10], "7\n", *PTS[10:]]), f":11: expected 4 columns, found 1; {COLUMNS}"),
     "one long line": ("1 " * 1_000_000, ":1: the line is too long for a row; give every point a line"),
+    "a long line between others": (
+        "1 2 3\n" * 10 + "1 " * 1_000_000,
+        ":11: the line is too long for a row; give every point a line",
+    ),
     "PTX": (
         "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" + "1 0 0 0\n" * 4 + "1 2 3 0.5\n" * 4,
         ": is PTX, which cylx does not read; export it as E57 or PLY",
