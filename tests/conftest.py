@@ -146,5 +146,6 @@ def fake_pipeline(monkeypatch, make_extraction):
             return make_extraction(cloud, config, cylinders=self.found, blends=self.blends)
 
     fake = FakePipeline()
+    monkeypatch.setattr("cylx.api.warmup.kernels_are_cold", lambda: False)  # there is nothing to practise
     monkeypatch.setattr("cylx.pipeline.extract_cylinders", fake)
     return fake

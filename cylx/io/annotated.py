@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import shutil
+import struct
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from cylx.records import Extraction, PointCloud
 
 _TRIED = 3
+_MOST_STEPS = 4.0
+"""A coordinate in double precision may be off by this many steps of its file."""
 _OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "blue": "u1"}
 
 
@@ -120,6 +123,10 @@ def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
         return ""
     from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
 
+    scales, offsets = struct.unpack_from("<3d", header, 131), struct.unpack_from("<3d", header, 155)
+    for axis, scale, offset in zip("xyz", scales, offsets, strict=True):
+        if np.spacing(max(np.abs(table[axis]).max(), abs(offset))) > _MOST_STEPS * abs(scale):
+            return f"the steps of {axis}, {scale:g}, are lost so far from the origin"
     few = table[:_TRIED]
     ours = {name: np.zeros(len(few), kind) for name, kind in _OURS.items()}
     try:

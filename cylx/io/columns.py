@@ -39,6 +39,7 @@ _FAMILIES = (
 )
 """Names of the two horizontal axes: as x and y, on a map, and in degrees."""
 _DEGREES = 3
+_LONGEST_NAME = 200
 _HEIGHTS = _words(
     "elevation elevations elev height heights h alt altitude hohe hoehe hoogte hojd rl cota quota altura altezza "
     "hauteur elevacion"
@@ -123,12 +124,12 @@ def is_other(name: str) -> bool:
     >>> is_other("Intensity"), is_other("laser_id"), is_other("a")
     (True, True, False)
     """
-    return not _OTHERS.isdisjoint(_words_of(name))
+    return len(name) <= _LONGEST_NAME and not _OTHERS.isdisjoint(_words_of(name))
 
 
 def _read_name(name: str) -> tuple[str, tuple[str, ...]]:
     """Return the word of a name that says an axis, "" if none does, and its other words; units are left out."""
-    words = _words_of(name)
+    words = _words_of(name) if len(name) <= _LONGEST_NAME else []
     spare = [word for word in words if word not in _UNITS]
     axes = [word for word in spare if word in ("x", "y", "z")]
     rest = tuple(word for word in spare if word not in axes)

@@ -293,8 +293,10 @@ def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
     for key, values in (("SIZE", sizes), ("TYPE", kinds), ("COUNT", counts)):
         if len(values) != len(names):
             raise InputError(place, f"{len(names)} FIELDS, but {key} has {len(values)}", _REMEDY)
-    if sum(counts) > _MOST_COLUMNS:
-        raise InputError(place, f"expected at most {_MOST_COLUMNS} values per point, found {sum(counts)}", _REMEDY)
+    most = max(sum(counts), len(names))
+    if most > _MOST_COLUMNS:
+        raise InputError(place, f"expected at most {_MOST_COLUMNS} values per point, found {most}", _REMEDY)
+    coordinates = coordinate_names(names)
     fields: list[_Field] = []
     offset = 0
     for name, kind, size, count in zip(names, kinds, sizes, counts, strict=True):
@@ -302,7 +304,7 @@ def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
             raise InputError(
                 place, f"field {excerpt(name)} has the unknown type {excerpt(kind)} of size {size}", _REMEDY
             )
-        if name in coordinate_names(names) and count != 1:
+        if name in coordinates and count != 1:
             raise InputError(place, f"field {name} has {count} values", "give a PCD with one x, y and z per point")
         fields.append(_Field(name, _TYPES[kind.upper(), size], count, offset))
         offset += fields[-1].width

@@ -7,6 +7,7 @@ import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -111,9 +112,8 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
         fewer rows than `rows.count`.
     """
     most = _most_rows(source, rows)
-    try:
-        table = _read_fast(source, rows, most)
-    except (ValueError, DeprecationWarning):
+    table = _read_fast(source, rows, most)
+    if table is None:
         # The fast reader failed. The slower one finds the line that is wrong; if none is, it returns the rows.
         with text_lines(source, rows.offset, rows.encoding) as lines:
             table = _load(_checked(lines, rows, source.place), rows, None, most)
@@ -141,34 +141,71 @@ def text_lines(source: Input, offset: int = 0, encoding: str = "utf-8-sig") -> I
         lines.detach()
 
 
-def _read_fast(source: Input, rows: RowFormat, most: int | None) -> NDArray[np.void]:
-    """Read rows by numpy alone.
+def _read_fast(source: Input, rows: RowFormat, most: int | None) -> NDArray[np.void] | None:
+    """Read rows by numpy alone, or with a little help; None if they need a closer look."""
+    plain = rows.kept is None and not (rows.commented and _is_sharp(source, rows))
+    for helped in (False, True):
+        if not (rows.loose if helped else plain):
+            continue
+        try:
+            with text_lines(source, rows.offset, rows.encoding) as lines:
+                if helped:
+                    table = _load(_picked(lines, rows), rows, None, most)
+                else:
+                    table = _load(_short(lines), rows, rows.delimiter, most)
+        except (ValueError, DeprecationWarning):
+            continue
+        if rows.promised is not None and rows.promised != len(table):
+            raise wrong_count(source.place, rows.promised, len(table))
+        return table
+    return None
+
+
+def _picked(lines: Iterable[str], rows: RowFormat) -> Iterator[str]:
+    """Yield the columns of numbers with decimal points, up to the first line that needs a closer look.
 
     Raises
     ------
     ValueError
-        If they need a closer look.
+        At that line.
     """
-    if rows.kept is not None or (rows.commented and _is_sharp(source, rows)):
-        raise ValueError("numpy would read it wrongly")
-    with text_lines(source, rows.offset, rows.encoding) as lines:
-        table = _load(lines, rows, rows.delimiter, most)
-    if rows.promised is not None and rows.promised != len(table):
-        raise wrong_count(source.place, rows.promised, len(table))
-    return table
+    pick = None if rows.kept is None else itemgetter(*rows.kept)
+    yield from ("\n" for _ in range(rows.skip))
+    commas = points = False
+    for line in islice(lines, rows.skip, None):
+        if len(line) > LONGEST_LINE or '"' in line or "#" in line or "//" in line:
+            raise ValueError("a closer look is needed")
+        cells = line.split(rows.delimiter)
+        if len(cells) != rows.width:
+            if line.strip():
+                raise ValueError("a closer look is needed")
+            continue
+        text = " ".join(cells if pick is None else pick(cells))
+        commas, points = commas or "," in text, points or "." in text
+        if commas and (points or rows.delimiter == ","):
+            raise ValueError("a closer look is needed")
+        yield text.replace(",", ".")
+
+
+def _short(lines: Iterable[str]) -> Iterator[str]:
+    """Yield the lines up to one that is too long: numpy would take many times its size."""
+    for line in lines:
+        if len(line) > LONGEST_LINE:
+            raise ValueError("the line is too long")
+        yield line
 
 
 def _is_sharp(source: Input, rows: RowFormat) -> bool:
     """Return whether a `#` of the text belongs to a number."""
-    mark = SHARP.encode(rows.encoding if rows.encoding.endswith(("le", "be")) else "utf-8")
-    if rows.encoding in ("utf-16", "utf-32"):
-        return True  # numpy is no faster there that it would pay
+    width = rows.encoding.removeprefix("utf-")
+    codes = [rows.encoding] if width not in ("16", "32") else [f"{rows.encoding}-le", f"{rows.encoding}-be"]
+    marks = [SHARP.encode("utf-8" if width == "8-sig" else code) for code in codes]
     source.file.seek(rows.offset)
     before = b""
     while block := source.file.read(_BLOCK):
-        if mark in before + block:
+        if any(mark in before + block for mark in marks):
             return True
-        before = block[1 - len(mark) :]
+        before = block[1 - len(marks[0]) :]
     return False
 
 
@@ -263,8 +300,9 @@ def _filled(values: list[str], rows: RowFormat, where: str) -> list[str]:
         if not value and rows.loose and (nowhere or name not in ("x", "y", "z")):  # a point has all three, or none
             out.append("nan")
             continue
-        check_number(where, name, value, rows.dtype[name])
-        out.append(str(int(value)) if rows.dtype[name].kind in "iu" else value)  # numpy refuses -0 and +1
+        kind = rows.dtype[name]
+        check_number(where, name, value, kind)
+        out.append(str(int(value)) if kind.kind in "iu" else value)  # numpy refuses -0 and +1
     return out
 
 

@@ -152,13 +152,15 @@ def _by_place(
 
 
 def _refuse_contradiction(names: Sequence[str], taken: Sequence[int], place: str) -> None:
-    """Refuse columns of which one is named after another axis than it is taken for, or after something else."""
+    """Refuse columns of which two are named after other axes or other things; a single word may be one of a title."""
     axes = named_axes(names)
     colored = {"r", "g", "b"} <= {name.lower() for name in names}
-    others = [names[column] for column in taken if names]
-    other = next((name for name in others if is_other(name) or (colored and name.lower() in "rgb")), None)
-    if other is not None:
-        raise InputError(place, f"no columns are called x, y and z, and {excerpt(other)} is none of them", _RENAME)
+    given = [names[column] for column in taken if names]
+    others = [name for name in given if is_other(name) or (colored and name.lower() in "rgb")]
+    if len(others) + len(axes) > 1 and others:
+        raise InputError(place, f"no columns are called x, y and z, and {excerpt(others[0])} is none of them", _RENAME)
+    if len(axes) < 2:
+        return
     for axis, column in axes.items():
         if column in taken and taken["xyz".index(axis)] != column:
             missing = ", ".join(other for other in "xyz" if other not in axes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from cylx.errors import InputError
@@ -194,6 +195,7 @@ def _sample(lines: io.TextIOBase, place: str) -> Iterator[_Line]:
         seen += bool(row)
 
 
+@lru_cache(64)
 def _names_coordinates(text: str) -> bool:
     """Return whether a line names x, y and z."""
     if not text or not any(c.isalpha() for c in text):

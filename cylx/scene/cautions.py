@@ -24,7 +24,7 @@ COPIES = 0.2
 """From this share of duplicate points on, the measured spacing is too small by a tenth or more."""
 MANY = 1000
 """This many copies are worth a word …"""
-FEW_COPIES = 0.02
+FEW_COPIES = 0.005
 """… unless they are a smaller share than this."""
 FEWEST_ZEROS = 10
 """Fewer points at the origin than this may have been measured there."""
@@ -182,7 +182,7 @@ def _copies(points: FloatArray, step: float, scene: Scene) -> Caution | None:
     share = np.count_nonzero(some[1:] == some[:-1]) / max(len(some), 1)
     count = round(share * np.count_nonzero(keys))
     by_chance = (step / scene.spacing) ** 2  # in cells as wide as a step, some points coincide by chance
-    if share <= COPIES + by_chance and (count < MANY or share <= FEW_COPIES + 2.0 * by_chance):
+    if share <= COPIES + by_chance and (count < MANY or share <= FEW_COPIES + 3.0 * by_chance):
         return None
     about = "" if sampled == 1 else "about "
     many = f"{about}{count} of {len(points)} points ({share:.0%})"

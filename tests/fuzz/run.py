@@ -62,7 +62,7 @@ def inputs_of(seeds, rng):
         yield mutate(rng, rng.choice(seeds), seeds)
 
 
-def fuzz(name, target, *, seed=0, inputs=None, seconds=None, findings=None):
+def fuzz(name, target, *, seed=0, inputs=None, seconds=None, findings=None, slowest=SLOWEST):
     """Fuzz one target and return the counts of its verdicts."""
     seeds, function = target
     rng = random.Random(f"{name} {seed}")
@@ -71,7 +71,7 @@ def fuzz(name, target, *, seed=0, inputs=None, seconds=None, findings=None):
     for number, data in enumerate(inputs_of(seeds, rng)):
         if (inputs is not None and number >= inputs) or (stop is not None and time.monotonic() > stop):
             break
-        verdict = judge(function, data, slowest=SLOWEST if number >= len(seeds) else 60.0)  # the first ones import
+        verdict = judge(function, data, slowest=slowest if number >= len(seeds) else 60.0)  # the first ones import
         counts["inputs"] += 1
         if verdict in ("success", "error"):
             counts[verdict] += 1

@@ -167,6 +167,12 @@ def test_an_ordinary_header_is_left_alone():
     assert (spliced.seek(-1, 2), spliced.read(), spliced.tell()) == (9, b"9", 10)
 
 
+def test_steps_that_double_precision_has_not_are_known_before(put):
+    data = packed(packed(las_bytes(1, "1.2", ()), "d", 131, 1e-9), "d", 155, 1e15)
+    with pytest.raises(OutputError, match="the steps of x, 1e-09, are lost so far from the origin; choose a name"):
+        check_annotated("out.las", read_cloud(put(data)))
+
+
 def forbid(*_args, **_settings):
     raise ValueError("no such\nluck " + "a" * 300)
 

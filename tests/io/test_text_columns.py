@@ -132,6 +132,14 @@ TOLD = {
         "foo,bar,baz\n" + rows(),
         "the names of the columns do not tell the coordinates; x, y, z are 'foo', 'bar', 'baz'",
     ),
+    "a title that looks like names": (
+        "Laser survey yesterday\n" + rows(sep=" "),
+        "the names of the columns do not tell the coordinates; x, y, z are 'Laser', 'survey', 'yesterday'",
+    ),
+    "a letter in a title": (
+        "Plant X scan\n" + rows(sep=" "),
+        "the names of the columns do not tell the coordinates; x, y, z are 'Plant', 'X', 'scan'",
+    ),
     "a column of words": ("Point,X,Y,Z\n" + rows(lambda i, p: [f"P{i}", *p]), WORDS + "'Point'"),
     "words with separators": ("x,y,z,code\n" + rows(lambda _, p: [*p, '"tree, big"']), WORDS + "'code'"),
     "words with a #": ("x;y;z;code\n" + rows(lambda i, p: [*p, f"tree #{i}"], ";"), WORDS + "'code'"),
@@ -234,6 +242,10 @@ WRONG = {
     ),
     "a row of one number": ("".join([*PTS[:10], "7\n", *PTS[10:]]), f":11: expected 4 columns, found 1; {COLUMNS}"),
     "one long line": ("1 " * 1_000_000, ":1: the line is too long for a row; give every point a line"),
+    "a long line between others": (
+        "1 2 3\n" * 10 + "1 " * 1_000_000,
+        ":11: the line is too long for a row; give every point a line",
+    ),
     "PTX": (
         "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" + "1 0 0 0\n" * 4 + "1 2 3 0.5\n" * 4,
         ": is PTX, which cylx does not read; export it as E57 or PLY",
