@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 
 _disabled = os.environ.pop("NUMBA_DISABLE_JIT", None)  # read when Numba is imported, and of no use here
 import numba  # noqa: E402
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, InTreeCacheLocator  # noqa: E402
+from numba.core.caching import CompileResultCacheImpl, FunctionCache  # noqa: E402
 from numba.core.serialize import dumps  # noqa: E402
 
 if _disabled is not None:
@@ -91,7 +91,13 @@ def times_compiled(kernel: Any) -> int:  # noqa: ANN401  a dispatcher of Numba
     return sum(kernel.stats.cache_misses.values())
 
 
-class _AnyTree(InTreeCacheLocator):  # type: ignore[misc]  # Numba has no types
+_LOCATORS: list[Any] = CompileResultCacheImpl._locator_classes
+_InTree: Any = next(
+    one for one in _LOCATORS if one.__name__.lstrip("_") == "InTreeCacheLocator"
+)  # numba 0.60 has the _
+
+
+class _AnyTree(_InTree):  # type: ignore[misc]  # Numba has no types
     """The folder of the source, even if it cannot be written to: an administrator may have filled it."""
 
     def ensure_cache_path(self) -> None:
@@ -99,7 +105,7 @@ class _AnyTree(InTreeCacheLocator):  # type: ignore[misc]  # Numba has no types
 
 
 class _Locations(CompileResultCacheImpl):  # type: ignore[misc]  # Numba has no types
-    _locator_classes = (*CompileResultCacheImpl._locator_classes, _AnyTree)
+    _locator_classes = (*_LOCATORS, _AnyTree)
 
 
 class KernelCache(FunctionCache):  # type: ignore[misc]  # Numba has no types
