@@ -140,6 +140,10 @@ TOLD = {
         "Plant X scan\n" + rows(sep=" "),
         "the names of the columns do not tell the coordinates; x, y, z are 'Plant', 'X', 'scan'",
     ),
+    "x, y and z of something": (
+        "u,v,cam_x,cam_y,cam_z\n" + rows(lambda _, p: [3, 4, *p]),
+        "x, y, z are 'cam_x', 'cam_y', 'cam_z'",
+    ),
     "a column of words": ("Point,X,Y,Z\n" + rows(lambda i, p: [f"P{i}", *p]), WORDS + "'Point'"),
     "words with separators": ("x,y,z,code\n" + rows(lambda _, p: [*p, '"tree, big"']), WORDS + "'code'"),
     "words with a #": ("x;y;z;code\n" + rows(lambda i, p: [*p, f"tree #{i}"], ";"), WORDS + "'code'"),
@@ -184,6 +188,10 @@ DOUBTFUL = {
         "E,N,Ellipsoidal height,Orthometric height\n" + rows(lambda _, p: [*p, 3.5]),
         SEVERAL + "'E', 'N', 'Ellipsoidal height'",
     ),
+    "row names of R": (
+        '"x" "y" "z"\n' + rows(lambda i, p: [f'"{i + 1}"', *p], " "),
+        "the first column has no name and seems to name the points; x, y, z are columns 2, 3, 4",
+    ),
     "x, y and z twice": ("X,Y,Z,X,Y,Z\n" + rows(lambda _, p: [*p, 1, 2, 3]), SEVERAL + "'X', 'Y', 'Z'"),
     "degrees": (
         "Time,Latitude,Longitude,Elevation\n" + rows(lambda i, p: [i / 10, p[1], p[0], p[2]]),
@@ -210,6 +218,10 @@ WRONG = {
     "an angle is no y": (
         "range,azimuth,pitch\n" + rows(),
         f": no columns are called x, y and z, and 'range' is none of them; {RENAME}",
+    ),
+    "velocities are no coordinates": (
+        "vel_x,vel_y,vel_z,a\n" + rows(more),
+        f": no columns are called x, y and z, and 'vel_x' is none of them; {RENAME}",
     ),
     "y is no x": ("a,X,Y,b\n" + rows(more), f": has a column 'X', but none for z; {RENAME}"),
     "names in the middle": (
