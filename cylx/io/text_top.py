@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _SAMPLE = 100
 """Lines that are looked at, besides comments."""
 _MOST_COLUMNS = 1000
+_COUNTED = (["points"], ["pts"], ["rows"])
+"""What may stand behind a count."""
 _PTX = [3, 3, 3, 3, 4, 4, 4, 4]
 """Numbers in the lines below the two counts of a PTX file: the scanner's place and axes, and a matrix."""
 
@@ -89,7 +91,7 @@ def read_top(lines: io.TextIOBase, place: str) -> Top:
         delimiter = delimiter_of(line.row)
         columns = _cells(line.row, delimiter, header)
         numbers = sum(_is_value(column) for column in columns)
-        if len(columns) == 1 and is_count(columns[0]):
+        if is_count(columns[0]) and (len(columns) == 1 or [word.lower() for word in columns[1:]] in _COUNTED):
             if count is not None:
                 _refuse_ptx(sample[index + 1 :], place)
                 wrong = line

@@ -82,6 +82,7 @@ SILENT = {
     "decimal commas in quotes": '"x","y","z"\n' + rows(quoted(",")),
     "numbers in quotes": '"x","y","z"\n' + rows(quoted(".")),
     "count below": "x y z i\n" + "".join(PTS) + "30\n",
+    "a count of points": "30 points\nX Y Z I\n" + "".join(PTS),
     "count above names": "30\nX Y Z I\n" + "".join(PTS),
     "blocks with counts": "x y z i\n10\n" + "".join(PTS[:10]) + "20\n" + "".join(PTS[10:]),
     "values that are missing": "x,y,z,label\n" + rows(lambda i, p: [*p, "" if i % 2 else i]),
