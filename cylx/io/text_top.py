@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 _SAMPLE = 100
 """Lines that are looked at, besides comments."""
 _MOST_COLUMNS = 1000
+_AROUND = "\"',; "
+"""What may stand around a name."""
 _COUNTED = (["points"], ["pts"], ["rows"])
 """What may stand behind a count."""
 _PTX = [3, 3, 3, 3, 4, 4, 4, 4]
@@ -154,11 +156,11 @@ def names_of(header: str, columns: int, delimiter: str | None) -> list[str]:
         for mark in dict.fromkeys((delimiter, "\t", ";", ",", "|", None)):
             names = split_row(text, mark)
             if len(names) == columns:
-                return [name.strip("\"' ") for name in names]
+                return [name.strip(_AROUND) for name in names]
         for pattern in (r"\s{2,}|\t", r"[\s,;]+"):
             names = re.split(pattern, text.strip())
             if len(names) == columns:
-                return [name.strip("\"' ") for name in names]
+                return [name.strip(_AROUND) for name in names]
     return []
 
 
@@ -168,8 +170,8 @@ def words_of(header: str, delimiter: str | None) -> list[str]:
     mark = delimiter if delimiter is not None and delimiter in bare else None
     for other in (mark, *"\t;,|"):
         if other is not None and other in bare:
-            return [name.strip("\"' ") for name in split_row(bare, other)]
-    return [word.strip("\"',; ") for word in split_row(bare, None)]
+            return [name.strip(_AROUND) for name in split_row(bare, other)]
+    return [word.strip(_AROUND) for word in split_row(bare, None)]
 
 
 def uncommented_header(header: str) -> str:
@@ -211,7 +213,7 @@ def _is_named(header: str) -> bool:
 
 
 def _is_named_by(text: str, mark: str | None) -> bool:
-    names = [name.strip("\"',; ") for name in split_row(text, mark)]
+    names = [name.strip(_AROUND) for name in split_row(text, mark)]
     return len(names) <= _MOST_COLUMNS and named_coordinates(names) is not None
 
 
