@@ -46,6 +46,12 @@ _HEIGHTS = _words(
 )
 _ALONG = _words("easting east northing north elevation elev height altitude up right forward")
 """Words that may stand beside x, y or z, which count."""
+_NO_PLACES = _words(
+    "normal normals n nn velocity vel v speed acc accel acceleration force gyro mag rot rotation angle angular euler q "
+    "quat orientation direction dir gradient origin sensor scanner station sd std stdev sigma error err var rms min "
+    "max size width scale offset d delta diff residual"
+)
+"""Words beside x, y or z that make something else of it."""
 _OTHERS = _words(
     "intensity reflectance reflectivity amplitude remission red green blue rgb rgba alpha nx ny nz normal normals "
     "curvature time timestamp gps class classification label ring laser return returns azimuth range distance angle "
@@ -64,10 +70,13 @@ class Coordinates:
         Indices of the columns.
     doubt : tuple of str
         A fault and a remedy if the names leave a doubt; otherwise empty.
+    note : str
+        What was taken, if the names are unusual; otherwise empty.
     """
 
     places: tuple[int, int, int]
     doubt: tuple[str, ...] = ()
+    note: str = ""
 
 
 def named_coordinates(names: Sequence[str]) -> Coordinates | None:
@@ -98,7 +107,7 @@ def named_coordinates(names: Sequence[str]) -> Coordinates | None:
         again = any(names.count(name) > 1 for name in exact) or {*names} >= set("xyzXYZ")
         return Coordinates((x, y, z), _several(names, (x, y, z)) if again else ())
     read = [_read_name(name) for name in names]
-    return _grouped(names, read) or _paired(names, read)
+    return _grouped(names, read) or _paired(names, read) or _alike(names)
 
 
 def named_axes(names: Sequence[str]) -> dict[str, int]:
@@ -121,10 +130,12 @@ def is_other(name: str) -> bool:
 
     Examples
     --------
-    >>> is_other("Intensity"), is_other("laser_id"), is_other("a")
-    (True, True, False)
+    >>> is_other("Intensity"), is_other("laser_id"), is_other("vel_x"), is_other("a")
+    (True, True, True, False)
     """
-    return len(name) <= _LONGEST_NAME and not _OTHERS.isdisjoint(_words_of(name))
+    words = _words_of(name) if len(name) <= _LONGEST_NAME else []
+    beside = not {"x", "y", "z"}.isdisjoint(words) and not _NO_PLACES.isdisjoint(words)
+    return beside or not _OTHERS.isdisjoint(words)
 
 
 def _read_name(name: str) -> tuple[str, tuple[str, ...]]:
@@ -170,6 +181,21 @@ def _grouped(names: Sequence[str], read: Sequence[tuple[str, tuple[str, ...]]]) 
     return Coordinates((x, y, z), _several(names, (x, y, z)) if several else ())
 
 
+def _alike(names: Sequence[str]) -> Coordinates | None:
+    """Find x, y and z beside an unknown word, such as cam_x, cam_y, cam_z, if there is one such triple."""
+    groups: dict[tuple[str, ...], dict[str, int]] = {}
+    for place, name in enumerate(names):
+        words = [word for word in _words_of(name) if word not in _UNITS] if len(name) <= _LONGEST_NAME else []
+        axes = [word for word in words if word in ("x", "y", "z")]
+        if len(axes) == 1 and _NO_PLACES.isdisjoint(words):
+            groups.setdefault(tuple(word for word in words if word not in axes), {})[axes[0]] = place
+    whole = [axes for axes in groups.values() if len(axes) == 3]
+    if len(whole) != 1:
+        return None
+    x, y, z = (whole[0][axis] for axis in "xyz")
+    return Coordinates((x, y, z), note=f"x, y, z are {_taken(names, (x, y, z))}")
+
+
 def _paired(names: Sequence[str], read: Sequence[tuple[str, tuple[str, ...]]]) -> Coordinates | None:
     """Find two horizontal axes of one family and a height."""
     heights = _those(read, frozenset("z")) or _those(read, _HEIGHTS)
@@ -199,8 +225,12 @@ def _tied(read: Sequence[tuple[str, tuple[str, ...]]], found: Sequence[int]) -> 
 
 
 def _several(names: Sequence[str], places: Iterable[int]) -> tuple[str, str]:
-    taken = ", ".join(_quoted(names[place]) for place in places)
-    return f"several columns may be the coordinates; x, y, z are {taken}", "call the right ones x, y and z"
+    fault = f"several columns may be the coordinates; x, y, z are {_taken(names, places)}"
+    return fault, "call the right ones x, y and z"
+
+
+def _taken(names: Sequence[str], places: Iterable[int]) -> str:
+    return ", ".join(_quoted(names[place]) for place in places)
 
 
 def _quoted(name: str) -> str:

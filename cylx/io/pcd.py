@@ -261,7 +261,7 @@ def _read_header(source: Input) -> _Header:
             said[key] = words[1:] if key == "FIELDS" else line.partition("#")[0].split()[1:]
         elif not said:
             raise InputError(source.place, "is not PCD: it does not begin with its header", _SUFFIX_REMEDY)
-        elif len(words) < 2 or not words[0].isidentifier():
+        elif not words[0].isidentifier() or (len(words) < 2 and not words[0].isupper()):
             fault = f"{excerpt(' '.join(words))} is not a line of a PCD header"
             raise InputError(f"{source.place}:{number}", fault, _REMEDY)
     body = " ".join(said["DATA"]).lower()

@@ -67,10 +67,10 @@ def choose_columns(top: Top, place: str) -> Columns:
         names = []
     found = named_coordinates(names) if names else None
     if found is None and not names and top.header:
-        found = _aligned(top, width, place)
+        found = _aligned(top, rows, width, place)
     words = _word_columns(rows, width, () if found is None else found.places)
     kept = [column for column in range(width) if column not in words]
-    notes: list[str] = []
+    notes = [found.note] if found is not None and found.note else []
     doubts = [(found.doubt[0], found.doubt[1])] if found is not None and found.doubt else []
     if found is None:
         found, note, doubts = _by_place(names, rows, kept, width, place)
@@ -90,12 +90,22 @@ def _is_mark(top: Top, names: Sequence[str], rows: Sequence[Sequence[str]], widt
     return names[0] == "//" or not _is_numbered(rows, [*range(width)])
 
 
-def _aligned(top: Top, width: int, place: str) -> Coordinates | None:
-    """Find the coordinates by names that are more or fewer than the columns, if they are the first or the last."""
+def _aligned(top: Top, rows: Sequence[Sequence[str]], width: int, place: str) -> Coordinates | None:
+    """Find the coordinates by names that are more or fewer than the columns, if they are the first or the last.
+
+    A column of row names, as R writes it, has no name.
+    """
     said = words_of(top.header, top.delimiter)
     found = named_coordinates(said)
     if found is None:
         return None
+    ordinary = is_number(plain_number(rows[0][0])) and not _is_numbered(rows, [*range(width)])
+    if len(said) == width - 1 and not ordinary:
+        x, y, z = (column + 1 for column in found.places)
+        fault = (
+            f"the first column has no name and seems to name the points; x, y, z are columns {x + 1}, {y + 1}, {z + 1}"
+        )
+        return Coordinates((x, y, z), found.doubt or (fault, "name every column"))
     if sorted(found.places) == [0, 1, 2]:
         if top.delimiter == "," and width == 2 * len(said) and _are_halves(top.rows, width):
             remedy = "write numbers with a point, or semicolons between the columns"

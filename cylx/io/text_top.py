@@ -29,6 +29,10 @@ if TYPE_CHECKING:
 _SAMPLE = 100
 """Lines that are looked at, besides comments."""
 _MOST_COLUMNS = 1000
+_AROUND = "\"',; "
+"""What may stand around a name."""
+_COUNTED = (["points"], ["pts"], ["rows"])
+"""What may stand behind a count."""
 _PTX = [3, 3, 3, 3, 4, 4, 4, 4]
 """Numbers in the lines below the two counts of a PTX file: the scanner's place and axes, and a matrix."""
 
@@ -89,7 +93,7 @@ def read_top(lines: io.TextIOBase, place: str) -> Top:
         delimiter = delimiter_of(line.row)
         columns = _cells(line.row, delimiter, header)
         numbers = sum(_is_value(column) for column in columns)
-        if len(columns) == 1 and is_count(columns[0]):
+        if is_count(columns[0]) and (len(columns) == 1 or [word.lower() for word in columns[1:]] in _COUNTED):
             if count is not None:
                 _refuse_ptx(sample[index + 1 :], place)
                 wrong = line
@@ -152,11 +156,11 @@ def names_of(header: str, columns: int, delimiter: str | None) -> list[str]:
         for mark in dict.fromkeys((delimiter, "\t", ";", ",", "|", None)):
             names = split_row(text, mark)
             if len(names) == columns:
-                return [name.strip("\"' ") for name in names]
+                return [name.strip(_AROUND) for name in names]
         for pattern in (r"\s{2,}|\t", r"[\s,;]+"):
             names = re.split(pattern, text.strip())
             if len(names) == columns:
-                return [name.strip("\"' ") for name in names]
+                return [name.strip(_AROUND) for name in names]
     return []
 
 
@@ -166,8 +170,8 @@ def words_of(header: str, delimiter: str | None) -> list[str]:
     mark = delimiter if delimiter is not None and delimiter in bare else None
     for other in (mark, *"\t;,|"):
         if other is not None and other in bare:
-            return [name.strip("\"' ") for name in split_row(bare, other)]
-    return [word.strip("\"',; ") for word in split_row(bare, None)]
+            return [name.strip(_AROUND) for name in split_row(bare, other)]
+    return [word.strip(_AROUND) for word in split_row(bare, None)]
 
 
 def uncommented_header(header: str) -> str:
@@ -209,7 +213,7 @@ def _is_named(header: str) -> bool:
 
 
 def _is_named_by(text: str, mark: str | None) -> bool:
-    names = [name.strip("\"',; ") for name in split_row(text, mark)]
+    names = [name.strip(_AROUND) for name in split_row(text, mark)]
     return len(names) <= _MOST_COLUMNS and named_coordinates(names) is not None
 
 

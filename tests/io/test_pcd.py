@@ -221,7 +221,7 @@ def driver_pcd(body="binary", keys=str, data="DATA", extra=""):
         driver_pcd(),
         driver_pcd("ascii"),
         driver_pcd("BINARY", str.lower),
-        driver_pcd(extra="FRAME_ID map\nSCALE 1 1 1\n# a remark\n\n").replace(b"FRAME", b"VERSION .7\nFRAME", 1),
+        driver_pcd(extra="VERSION .7\nFRAME_ID map\nSCALE 1 1 1\nTIMESTAMP\n# a remark\n\n"),
         b"\xef\xbb\xbf" + driver_pcd("ascii"),
         driver_pcd().replace(b"POINTS 2", b"POINTS 2 # two").replace(b"WIDTH 2", b"WIDTH 2 # wide"),
     ],

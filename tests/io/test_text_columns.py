@@ -82,6 +82,7 @@ SILENT = {
     "decimal commas in quotes": '"x","y","z"\n' + rows(quoted(",")),
     "numbers in quotes": '"x","y","z"\n' + rows(quoted(".")),
     "count below": "x y z i\n" + "".join(PTS) + "30\n",
+    "a count of points": "30 points\nX Y Z I\n" + "".join(PTS),
     "count above names": "30\nX Y Z I\n" + "".join(PTS),
     "blocks with counts": "x y z i\n10\n" + "".join(PTS[:10]) + "20\n" + "".join(PTS[10:]),
     "values that are missing": "x,y,z,label\n" + rows(lambda i, p: [*p, "" if i % 2 else i]),
@@ -140,6 +141,10 @@ TOLD = {
         "Plant X scan\n" + rows(sep=" "),
         "the names of the columns do not tell the coordinates; x, y, z are 'Plant', 'X', 'scan'",
     ),
+    "x, y and z of something": (
+        "u,v,cam_x,cam_y,cam_z\n" + rows(lambda _, p: [3, 4, *p]),
+        "x, y, z are 'cam_x', 'cam_y', 'cam_z'",
+    ),
     "a column of words": ("Point,X,Y,Z\n" + rows(lambda i, p: [f"P{i}", *p]), WORDS + "'Point'"),
     "words with separators": ("x,y,z,code\n" + rows(lambda _, p: [*p, '"tree, big"']), WORDS + "'code'"),
     "words with a #": ("x;y;z;code\n" + rows(lambda i, p: [*p, f"tree #{i}"], ";"), WORDS + "'code'"),
@@ -184,6 +189,10 @@ DOUBTFUL = {
         "E,N,Ellipsoidal height,Orthometric height\n" + rows(lambda _, p: [*p, 3.5]),
         SEVERAL + "'E', 'N', 'Ellipsoidal height'",
     ),
+    "row names of R": (
+        '"x" "y" "z"\n' + rows(lambda i, p: [f'"{i + 1}"', *p], " "),
+        "the first column has no name and seems to name the points; x, y, z are columns 2, 3, 4",
+    ),
     "x, y and z twice": ("X,Y,Z,X,Y,Z\n" + rows(lambda _, p: [*p, 1, 2, 3]), SEVERAL + "'X', 'Y', 'Z'"),
     "degrees": (
         "Time,Latitude,Longitude,Elevation\n" + rows(lambda i, p: [i / 10, p[1], p[0], p[2]]),
@@ -210,6 +219,10 @@ WRONG = {
     "an angle is no y": (
         "range,azimuth,pitch\n" + rows(),
         f": no columns are called x, y and z, and 'range' is none of them; {RENAME}",
+    ),
+    "velocities are no coordinates": (
+        "vel_x,vel_y,vel_z,a\n" + rows(more),
+        f": no columns are called x, y and z, and 'vel_x' is none of them; {RENAME}",
     ),
     "y is no x": ("a,X,Y,b\n" + rows(more), f": has a column 'X', but none for z; {RENAME}"),
     "names in the middle": (
