@@ -75,7 +75,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
     for block in chain([first], pieces):
         part, body = document(block), io.BytesIO()
         part.write(body)
-        file.write(body.getbuffer()[len(part.header) + 1 :])
+        file.write(body.getvalue()[len(part.header) + 1 :])
 
 
 def ply_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
