@@ -6,7 +6,7 @@ import pytest
 
 TESTS = Path(__file__).resolve().parent
 PACKAGE = TESTS.parent / "cylx"
-APART = {"benchmarks", "training", "support"}
+APART = {"faults", "benchmarks", "training", "support"}
 """Folders without tests."""
 FILES = sorted(
     path.relative_to(TESTS) for path in TESTS.rglob("*.py") if path.parent != TESTS and path.name != "__init__.py"

@@ -15,6 +15,7 @@ from cylx.cli.terminal.signals import Ended, check_heard, hear, heard
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="of Unix")
 CYLX = f"{sys.executable} -m cylx"
+SHORT_OF_FILES = "cp s.xyz t.xyz; ulimit -n 10;"
 FULL = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no full device here")  # noqa: PTH110
 
 
