@@ -215,7 +215,7 @@ def _check_folder(folder: Path, place: str) -> None:
 
 
 def _refuse_os_error(place: str, error: OSError | ValueError) -> NoReturn:
-    fault = getattr(error, "strerror", None) or str(error)
+    fault = "embedded null byte" if isinstance(error, ValueError) else error.strerror or str(error)
     full = getattr(error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
     remedy = "free some space, or choose another folder" if full else "choose another path"
     raise OutputError(place, f"cannot be written: {fault[:1].lower() + fault[1:]}", remedy) from error

@@ -78,7 +78,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
             continue
         part, body = document(_renamed(block)), io.BytesIO()
         part.write(body)
-        file.write(body.getbuffer()[len(part.header) + 1 :])
+        file.write(body.getvalue()[len(part.header) + 1 :])
 
 
 def _renamed(rows: NDArray[np.void]) -> NDArray[np.void]:

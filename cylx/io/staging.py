@@ -79,7 +79,7 @@ class Group:
         """Give a file its name, and keep the file that it replaces for a while."""
         old: Path | None = temporary_beside(target, ".old")
         try:
-            os.link(target, old)  # type: ignore[arg-type]
+            os.link(target, old, follow_symlinks=False)  # type: ignore[arg-type]
         except FileNotFoundError:
             old = None
         except OSError:  # the file system has no links: what is replaced cannot be put back

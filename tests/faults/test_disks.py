@@ -68,7 +68,7 @@ def watched(monkeypatch, fault, what):
     else:
         renamed, linked = Path.replace, os.link
         monkeypatch.setattr(Path, "replace", lambda path, to: (fault(to), renamed(path, to))[1])
-        monkeypatch.setattr(os, "link", lambda path, to: (fault(to), linked(path, to))[1])
+        monkeypatch.setattr(os, "link", lambda path, to, **how: (fault(to), linked(path, to, **how))[1])
 
 
 def contents(folder):

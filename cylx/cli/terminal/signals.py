@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 from types import FrameType
 from typing import NoReturn
 
@@ -40,6 +41,7 @@ def listen(*, worker: bool = False) -> None:
     """
     if worker:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
+    sys.unraisablehook = _pass_over
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
@@ -101,6 +103,12 @@ class Listener:
     def stage_finished(self, name: str, seconds: float) -> None:
         """Ask."""
         check_heard()
+
+
+def _pass_over(swallowed: sys.UnraisableHookArgs) -> None:
+    """Print nothing about a signal that a callback has swallowed: it is remembered."""
+    if not isinstance(swallowed.exc_value, KeyboardInterrupt | Ended):
+        sys.__unraisablehook__(swallowed)
 
 
 def _raise(number: int) -> NoReturn:
