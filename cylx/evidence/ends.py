@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import coordinates_of
-from cylx.records import Finding, IndexedCloud
+from cylx.records import Finding, IndexedCloud, Segment
 
 LEAST_COVERAGE = math.radians(300.0)
 """What hides the middle of a pipe hides it from one side. Of a piece seen all round nothing is hidden at its end."""
@@ -17,6 +18,12 @@ CLEAN_SHARE = 0.85
 """Share of the sectors that must end at one height for the end to be a cut across the axis."""
 GAPS_OF_POINTS, ALLOWED_RADII = 3.0, 0.05
 """They do if within so many usual gaps between points and this share of the radius."""
+RIM_RADII, BESIDE_RADII = 0.15, 0.3
+"""What adjoins an end lies within so many radii of it, along and across the axis,"""
+OFF_DEVIATIONS, OFF_RADII = 4.0, 0.03
+"""off the surface by more than this,"""
+ADJOINED_SHARE = 0.7
+"""and in this share of the sectors. A pipe whose middle nobody saw ends in nothing."""
 TELLING_SHARE = 0.6
 """If this is more than this share of the height, points are too few to tell."""
 
@@ -39,7 +46,7 @@ def are_distinct(one: Finding, other: Finding, indexed: IndexedCloud, gap: float
 
 
 def ends_in_cut(finding: Finding, indexed: IndexedCloud, upper: bool, most: float = math.inf) -> bool:
-    """Return whether a piece ends in a cut across its axis, all round.
+    """Return whether a piece ends in a cut across its axis, all round, at something that adjoins it.
 
     Parameters
     ----------
@@ -55,7 +62,7 @@ def ends_in_cut(finding: Finding, indexed: IndexedCloud, upper: bool, most: floa
         return False
     heights, _, angles = coordinates_of(indexed.points, finding.points, segment.model)
     heights = heights if upper else -heights
-    sectors = ((angles / (2.0 * math.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
+    sectors = _sectors_of(angles)
     counts = np.bincount(sectors, minlength=SECTORS)
     full = counts > 0
     allowed = GAPS_OF_POINTS * 2.0 * segment.half / float(np.median(counts[full])) + ALLOWED_RADII * segment.radius
@@ -63,4 +70,20 @@ def ends_in_cut(finding: Finding, indexed: IndexedCloud, upper: bool, most: floa
         return False
     ends = np.full(SECTORS, -np.inf)
     np.maximum.at(ends, sectors, heights)
-    return bool((ends[full] > segment.half - allowed).mean() >= CLEAN_SHARE)
+    if (ends[full] > segment.half - allowed).mean() < CLEAN_SHARE:
+        return False
+    return _adjoins(segment, indexed, upper, int(full.sum()))
+
+
+def _adjoins(segment: Segment, indexed: IndexedCloud, upper: bool, covered: int) -> bool:
+    """Return whether something adjoins an end all round: a plate about the mouth of a bore, a cap of a pin."""
+    radius, end = segment.radius, segment.half if upper else -segment.half
+    along, across = RIM_RADII * radius, BESIDE_RADII * radius
+    near = indexed.cells.near_cylinder(segment.model, end - along, end + along, radius - across, radius + across)
+    _, residuals, angles = coordinates_of(indexed.points, near, segment.model)
+    beside = np.abs(residuals) > max(OFF_DEVIATIONS * segment.spread, OFF_RADII * radius)
+    return len(np.unique(_sectors_of(angles[beside]))) >= ADJOINED_SHARE * covered
+
+
+def _sectors_of(angles: FloatArray) -> IndexArray:
+    return np.asarray(((angles / (2.0 * math.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS)

@@ -52,6 +52,8 @@ class Term(NamedTuple):
 
 FORM = 0.012
 """Real objects deviate from a cylinder by about this share of their radius: cans have seams, pipes are out of round."""
+STEEP = 0.08
+"""A slope beyond what is excused of this much counts twice."""
 SEEN = 0.005
 """Move of the ends, in radii, that counts in full."""
 FORM_SCATTER = 1.2
@@ -101,9 +103,10 @@ def _payoff(measures: Mapping[str, float]) -> float:
 
 
 def _slope(measures: Mapping[str, float]) -> float:
-    """Return the slope beyond two standard errors, or beyond what moves the ends by `FORM`; at most 0.3."""
+    """Return the slope beyond two standard errors, or beyond what moves the ends by `FORM`; a steep one counts more."""
     excused = max(2.0 * measures["slope_error"], FORM / _height(measures))
-    return min(max(0.0, abs(measures["slope"]) - excused), 0.3)
+    slope = max(0.0, abs(measures["slope"]) - excused)
+    return min(slope + slope**2 / STEEP, 0.5)
 
 
 def _flank(measures: Mapping[str, float]) -> float:
@@ -148,43 +151,50 @@ def _height(measures: Mapping[str, float]) -> float:
     return max(measures["height_radii"], 0.05)
 
 
-BIAS = -2.253
+BIAS = -3.567
 TERMS = (
     # what its form is like
-    Term("form", -1.813, 0.16, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
-    Term("other shape", -9.153, 0.02, _explained),
-    Term("lack of fit", -0.650, 0.16, _misfit),
-    Term("facets", -4.252, 0.01, _facets),
+    Term("form", -1.707, 0.10, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("other shape", -6.624, 0.01, _explained),
+    Term("lack of fit", -1.064, 0.17, _misfit),
+    Term("facets", -2.328, 0.02, _facets),
     # other points inside and just outside, and going on past an end of the arc or off to one side
-    Term("inside", -1.427, 0.05, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -1.649, 0.28, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("tangent", -2.368, 0.03, lambda m: min(m["tangent"], 1.5)),
-    Term("flank", -14.894, 0.00, _flank),
+    Term("inside", -1.487, 0.03, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -1.070, 0.21, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("tangent", -1.603, 0.03, lambda m: min(m["tangent"], 1.5)),
+    Term("flank", -14.634, 0.00, _flank),
     # how much of a cylinder is there at all
-    Term("few points", 2.865, -0.02, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
-    Term("few lines", 2.540, -0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
-    Term("curvature", 1.623, 1.57, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
+    Term("few points", 3.191, -0.02, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
+    Term("few lines", 1.019, -0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
+    Term("curvature", 1.417, 1.56, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
     # what the candidates say
-    Term("payoff", 3.114, 0.83, _payoff),
-    Term("agreement", 3.660, 0.38, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
+    Term("payoff", 3.740, 0.82, _payoff),
+    Term("agreement", 4.163, 0.40, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
     # cones, barrels, elbows
-    Term("slope", -25.0, 0.00, _slope),
-    Term("bulge", -13.162, 0.01, _bulge),
-    Term("bend", -22.869, 0.00, _bend),
-    Term("other shape", -25.0, 0.00, _one_shape),
+    Term("slope", -10.0, 0.00, _slope),
+    Term("bulge", -8.186, 0.01, _bulge),
+    Term("bend", -5.946, 0.00, _bend),
+    Term("other shape", -58.583, 0.00, _one_shape),
 )
 
-BLEND_BIAS = -12.702
+BLEND_BIAS = -13.402
 BLEND_TERMS = (
-    Term("noise", -6.402, 0.01, lambda m: _log(_thickness(m), 1.0, 20.0)),
-    Term("form", -5.637, 0.00, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
-    Term("oval", -20.579, 0.00, lambda m: min(m["ovality"], 0.1)),
-    Term("lack of fit", -2.788, 0.47, _misfit),
-    Term("few lines", 4.502, 0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
-    Term("curvature", 4.609, 1.61, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
-    Term("payoff", 7.975, 0.84, lambda m: m["payoff"]),
-    Term("agreement", 4.778, 0.40, lambda m: _log(m["agreement"] / 0.5, 0.1, 1.5)),
-    Term("bend", -9.540, 0.00, _bend),
+    Term("noise", -13.145, 0.00, lambda m: _log(_thickness(m), 1.0, 20.0)),
+    Term("form", -4.218, 0.00, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("oval", -37.873, 0.00, lambda m: min(m["ovality"], 0.1)),
+    Term("lack of fit", -1.803, 0.31, _misfit),
+    Term("few lines", 5.532, 0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
+    Term("curvature", 5.137, 1.61, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
+    Term("payoff", 7.938, 0.87, lambda m: m["payoff"]),
+    Term("agreement", 6.975, 0.38, lambda m: _log(m["agreement"] / 0.5, 0.1, 1.5)),
+    Term("bend", -0.000, 0.00, _bend),
+    Term("inside", -1.166, 0.53, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term(
+        "too rough",
+        -1.158,
+        0.02,
+        lambda m: _log(m["noise_ratio"] / 3.0, 1.0, 100.0) * min(1.0, m["deviation_radii"] / 0.003),
+    ),
 )
 
 

@@ -14,7 +14,7 @@ from cylx.stages.verification import Verdict, may_be_arc, verify
 
 SHORTEST_PIECE = 5.0
 """Pieces of a long segment have at least this height, in radii."""
-UNEVEN, MOST_UNEVEN = 0.02, 0.11
+UNEVEN, MOST_UNEVEN = 0.02, 0.1
 """Structure in the residuals, in radii, from which a long segment is looked at in pieces, as a trunk bends and tapers;
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
 OF_FORM = frozenset({"form", "agreement", "other shape", "lack of fit", "bend", "bulge", "slope", "facets"})

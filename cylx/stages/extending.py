@@ -19,6 +19,9 @@ from cylx.geometry.coverage import sector_of
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
 
+WIDE_GAP = 8.0
+"""Points beyond a cut end that begin after a gap of so many of their usual ones belong to another cylinder."""
+
 Judge = Callable[[Segment, Finding], Finding | None]
 
 EXTENSION_ROUNDS = 6
@@ -87,12 +90,13 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
     near = indexed.cells.near_cylinder(model, -reach, reach, 0.0, outer)
     near = near[indexed.may_be_on(near, model)]
     heights, residuals, _ = coordinates_of(indexed.points, near, model)
-    beyond = ((heights < -half) & ends_in_cut(finding, indexed, False)) | (
-        (heights > half) & ends_in_cut(finding, indexed, True)
-    )
-    near, heights, residuals = near[~beyond], heights[~beyond], residuals[~beyond]
     astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
-    fresh = (np.abs(heights) > half) & (np.abs(residuals) < 3.0 * noise + 2.0 * astray)
+    on = np.abs(residuals) < 3.0 * noise + 2.0 * astray
+    for sign in (-1.0, 1.0):
+        if ends_in_cut(finding, indexed, sign > 0.0) and _is_behind_gap(sign * heights[on], half):
+            near, heights, residuals, on = (one[sign * heights <= half] for one in (near, heights, residuals, on))
+    fresh = (np.abs(heights) > half) & on
+    astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
     if fresh.sum() < LEAST_POINTS_BEYOND_END:
         return None
     points = indexed.points[np.concatenate([finding.points, near[fresh]])]
@@ -117,6 +121,15 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
             return None
     longer[POINT] += 0.5 * (low + high) * longer[DIRECTION]
     return Segment(longer, 0.5 * (high - low), spread)
+
+
+def _is_behind_gap(heights: FloatArray, half: float) -> bool:
+    """Return whether the points beyond an end begin much further from it than they are from each other."""
+    beyond = heights[heights > half]
+    if len(beyond) < 2:
+        return False
+    first = float(beyond.min())
+    return first - half > WIDE_GAP * (float(beyond.max()) - first) / len(beyond)
 
 
 def _is_strip(beyond: FloatArray, before: FloatArray) -> bool:
