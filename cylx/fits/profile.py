@@ -101,6 +101,8 @@ def fit_profile(points: FloatArray, radius: float, middle: float, deviation: flo
     if upper.normal[1] < lower.normal[1] or not turned > LEAST_TURN:
         return None
     rotation = math.atan2(upper.normal[1] + lower.normal[1], upper.normal[0] + lower.normal[0])
+    if math.cos(rotation) < 0.0:  # the normals of a half turn nearly cancel each other
+        rotation, turned = rotation + math.pi, 2.0 * math.pi - turned
     if turned > PARALLEL:
         found = _slide(local, radius, upper, lower, deviation)
     else:

@@ -17,7 +17,9 @@ SHORTEST_PIECE = 5.0
 UNEVEN, MOST_UNEVEN = 0.02, 0.1
 """Structure in the residuals, in radii, from which a long segment is looked at in pieces, as a trunk bends and tapers;
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
-OF_FORM = frozenset({"form", "agreement", "other shape", "lack of fit", "bend", "bulge", "slope", "facets"})
+OF_FORM = frozenset(
+    {"form", "agreement", "other shape", "cone, barrel or elbow", "lack of fit", "bend", "bulge", "slope", "facets"}
+)
 """Reasons that a piece may not have."""
 
 

@@ -75,17 +75,18 @@ def find_rims(
         upright = which[np.abs(nearby.normals[which] @ direction.astype(np.float32)) < ACROSS]
         if len(upright) < LEAST_ON:
             continue
-        found, count = _about(frame.points[upright], direction, frame.noise.least, radius_range, threads)
+        found, looks = _about(frame.points[upright], direction, frame.noise.least, radius_range, threads)
         parts.append(found)
-        tried += count
+        tried += looks
     candidates = Candidates.joined(parts)
-    return candidates, StageReport("rims", tried, len(candidates), {})
+    without = tried - len(candidates)
+    return candidates, StageReport("rims", tried, len(candidates), {"no circle": without} if without else {})
 
 
 def _about(
     points: FloatArray, direction: FloatArray, noise: float, radius_range: tuple[float, float], threads: int
 ) -> tuple[Candidates, int]:
-    """Propose cylinders about one direction; also say how many places were looked at."""
+    """Propose cylinders about one direction; also say how many times one was looked for."""
     basis = np.empty((2, 3))
     fill_basis(direction, basis)
     heights = points @ direction
@@ -110,7 +111,7 @@ def _about(
         models[:, 3:6], models[:, 6] = direction, own[:, 2]
         models[:, 7], models[:, 8] = own[:, 5], np.maximum(2.5 * own[:, 4], LEAST_EXTENT)
         parts.append(Candidates.of_windows(models, 0.5 * reach, points[seeds[good]]))
-    return Candidates.joined(parts), len(seeds)
+    return Candidates.joined(parts), len(seeds) * len(REACHES)
 
 
 def _normals_of_planes(frame: Frame, flatness: FloatArray) -> FloatArray:

@@ -391,6 +391,7 @@ def test_reports_add_up(room, found, by_paper):
             [
                 "curvature",
                 "patches",
+                "rims",
                 "slicing",
                 "ellipses",
                 "candidates",

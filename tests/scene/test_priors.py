@@ -10,7 +10,7 @@ from cylx.api import extract
 from cylx.config import Config, load_config
 from cylx.evaluation import Tolerances, compare
 from cylx.geometry.lines import are_along
-from cylx.pipeline import extract_cylinders, rounds
+from cylx.pipeline import extract_cylinders, judging
 from cylx.records import PointCloud, Segment
 from cylx.results import Result
 from cylx.synthetic import single
@@ -110,7 +110,7 @@ def test_what_leaves_the_range_in_the_last_fit_is_dropped(monkeypatch, can, move
     config = Config(scene=scene)
     before = extract_cylinders(PointCloud(can.points), config)
     assert len(before.cylinders) == 1
-    monkeypatch.setattr(rounds, "finish", lambda s, *_, **__: Segment(moved(s.model), s.half, s.spread))
+    monkeypatch.setattr(judging, "finish", lambda s, *_, **__: Segment(moved(s.model), s.half, s.spread))
     after = extract_cylinders(PointCloud(can.points), config)
     assert after.cylinders == ()
     assert {stage.name: stage for stage in after.stages}["merging"].rejected == {reason: 1}

@@ -15,11 +15,11 @@ def proposed(points):
     prepared = prepare(PointCloud(points), Config())
     log = StageLog(SilentObserver())
     _, explained = windows_and_explained(prepared, log)
-    found, normals = candidates_of_patches(prepared, explained, log)
+    found, _, normals = candidates_of_patches(prepared, explained, log)
     models = found.models.copy()
     models[:, 6] *= prepared.frame.spacing
     models[:, :3] = models[:, :3] * prepared.frame.spacing + prepared.frame.origin
-    return models, normals, log.reports[-1]
+    return models, normals, next(report for report in log.reports if report.name == "patches")
 
 
 def wall(count, radius, height, seed=0):
