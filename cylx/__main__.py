@@ -1,12 +1,13 @@
 """`python -m cylx`, and the entry point of the command `cylx`."""
 
-from cylx.cli import main
-from cylx.cli.terminal.startup import own_process
-
 
 def run() -> None:
     """Run the command line in its own process."""
+    from cylx.cli.terminal.startup import own_process  # noqa: PLC0415  Ctrl-C is heard from there on
+
     with own_process():
+        from cylx.cli import main  # noqa: PLC0415
+
         main(prog_name="cylx")
 
 

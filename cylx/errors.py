@@ -6,6 +6,16 @@ and keeps its traceback.
 
 from typing import ClassVar
 
+_LONGEST = 400
+"""Letters of a part of a message: parts of files may be in it."""
+
+
+def _one_line(text: str) -> str:
+    """Return a text that a terminal shows on one line, shortened in its middle if it is long."""
+    if len(text) > _LONGEST:
+        text = f"{text[: _LONGEST // 2]} … {text[-_LONGEST // 2 :]}"
+    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
 
 class CylxError(Exception):
     """A failure that the user can correct.
@@ -29,7 +39,7 @@ class CylxError(Exception):
         self.remedy = remedy
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.fault}; {self.remedy}"
+        return f"{_one_line(self.place)}: {_one_line(self.fault)}; {_one_line(self.remedy)}"
 
 
 class UsageError(CylxError):

@@ -6,22 +6,32 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from click.testing import CliRunner
 from hypothesis import settings
 
-# where a red run costs most the examples are the same ones every time; everywhere else they are new ones
-settings.register_profile("ci", derandomize=True, deadline=None)
-settings.register_profile("anew", deadline=None)
-settings.load_profile("ci" if os.environ.get("CI") else "anew")
+# the examples are the same in every run; `pytest --hypothesis-profile search` looks for others, and for longer
+settings.register_profile("same", derandomize=True, deadline=None)
+settings.register_profile("search", max_examples=1000, deadline=None)
+settings.load_profile("same")
 
-# two processes that compile one kernel at the same moment may mix up what they keep of it: each worker keeps its own
-if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    os.environ["NUMBA_CACHE_DIR"] = str(Path(__file__).resolve().parents[1] / ".pytest_cache" / "kernels" / worker)
+# a worker for each core, and no more threads: small matrices take twice as long where threads wait for one another
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+KERNELS = Path(__file__).resolve().parents[1] / ".pytest_cache" / "kernels"
+os.environ["NUMBA_CACHE_DIR"] = str(KERNELS)
+
+import numpy as np  # noqa: E402  reads the number of threads
 
 CIRCLE = np.linspace(0, 2 * np.pi, 24, endpoint=False)
 POINTS = np.round(np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE), np.arange(24) % 5]), 6)
+
+
+def pytest_sessionstart(session):
+    """Compile the kernels once where several workers would each compile them."""
+    if (getattr(session.config.option, "numprocesses", None) or 0) > 1 and not hasattr(session.config, "workerinput"):
+        code = "from cylx.api.warmup import *; compile_kernels(SilentObserver())"
+        subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).resolve().parents[1], check=False)
 
 
 def pytest_addoption(parser):
@@ -35,6 +45,22 @@ def pytest_xdist_auto_num_workers(config):
     if few or config.option.keyword or config.option.regen:
         return 0
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _kept_readers():
+    """Read LAS and E57 in processes that stay, as starting one for each file takes a quarter of a second."""
+    if not sys.platform.startswith("linux"):
+        yield
+        return
+    from cylx.io import isolated
+    from tests.support.kept_readers import KeptReaders
+
+    readers, fresh = KeptReaders(), isolated.read_isolated
+    isolated.read_isolated = readers.read_isolated
+    yield
+    isolated.read_isolated = fresh
+    readers.close()
 
 
 @pytest.fixture
@@ -120,5 +146,6 @@ def fake_pipeline(monkeypatch, make_extraction):
             return make_extraction(cloud, config, cylinders=self.found, blends=self.blends)
 
     fake = FakePipeline()
+    monkeypatch.setattr("cylx.api.warmup.kernels_are_cold", lambda: False)  # there is nothing to practise
     monkeypatch.setattr("cylx.pipeline.extract_cylinders", fake)
     return fake

@@ -6,8 +6,10 @@ import pytest
 
 TESTS = Path(__file__).resolve().parent
 PACKAGE = TESTS.parent / "cylx"
-APART = {"benchmarks", "training", "support"}
+APART = {"benchmarks", "fuzz", "training", "support"}
 """Folders without tests."""
+OF_ALL = {"faults"}
+"""Folders with tests of the whole program."""
 FILES = sorted(
     path.relative_to(TESTS) for path in TESTS.rglob("*.py") if path.parent != TESTS and path.name != "__init__.py"
 )
@@ -26,7 +28,7 @@ def is_in_its_place(path, package=PACKAGE):
 
 
 def test_every_test_file_mirrors_a_module():
-    strangers = [path.as_posix() for path in FILES if path.parts[0] not in APART and not is_in_its_place(path)]
+    strangers = [path.as_posix() for path in FILES if path.parts[0] not in APART | OF_ALL and not is_in_its_place(path)]
     assert strangers == [], "name them after the module they test"
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from cylx.config import Config
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
+from cylx.geometry.kernels import at_each_kernel, damaged_files, folder_of, is_kept, times_compiled
 from cylx.geometry.morton import find_cell, morton_codes
 from cylx.pipeline import extract_cylinders
 from cylx.pipeline.assembly import assemble
@@ -35,20 +36,35 @@ LEVEL = 16
 def compile_kernels(observer: Observer) -> None:
     """Compile the kernels that are not compiled yet, by practising the whole method on a small cloud."""
     if kernels_are_cold():
-        with StageLog(observer).stage("compiling"), second_process():
+        with StageLog(observer).stage("compiling"), second_process() if kernels_are_kept() else nullcontext():
             extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
+
+
+def ask_between_kernels(call: Callable[[], None]) -> None:
+    """Call a function before each kernel is loaded or compiled, for example to notice Ctrl-C."""
+    at_each_kernel(call)
 
 
 def kernels_are_cold() -> bool:
     """Return whether kernels have yet to be compiled: the smallest of them is called, and says where it came from."""
-    before = sum(find_cell.stats.cache_misses.values())
+    before = times_compiled(find_cell)
     find_cell(np.zeros(1, np.int64), 0)
-    return bool(sum(find_cell.stats.cache_misses.values()) > before)
+    return times_compiled(find_cell) > before
 
 
-def kernel_folder() -> str:
-    """Name the folder where compiled kernels are kept."""
-    return str(find_cell.stats.cache_path)
+def kernel_folder() -> str | None:
+    """Name the folder where compiled kernels are kept; None if there is none."""
+    return folder_of(find_cell)
+
+
+def kernels_are_kept() -> bool:
+    """Return whether compiled kernels can be saved for the next run."""
+    return is_kept(find_cell)
+
+
+def damaged_kernels() -> list[str]:
+    """Return the names of damaged files among the kept kernels; they are compiled again."""
+    return damaged_files()
 
 
 def practice_cloud() -> FloatArray:

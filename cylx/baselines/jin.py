@@ -19,7 +19,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 
 from cylx.baselines.limits import Limits
 from cylx.baselines.proposal import Proposal
@@ -27,6 +26,7 @@ from cylx.config import JinConfig
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import canonical_direction
+from cylx.geometry.kernels import njit
 from cylx.records import Frame, stream
 
 SMALLEST, LARGEST = 6.0, 0.25

@@ -17,7 +17,6 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 
 from cylx.baselines.limits import Limits
 from cylx.baselines.normals import normals_for
@@ -26,6 +25,7 @@ from cylx.config import MsacConfig
 from cylx.fits.robust import WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ, cylinder_coordinates
+from cylx.geometry.kernels import njit
 from cylx.records import Frame
 
 LEAST_SINE = 1e-4

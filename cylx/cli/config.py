@@ -60,7 +60,10 @@ def show(*, settings: Config, as_json: bool) -> None:
     """
     from cylx.config import plain_yaml
 
-    answer(json.dumps(settings.model_dump(mode="json"), indent=2) + "\n" if as_json else plain_yaml(settings))
+    answer(
+        json.dumps(settings.model_dump(mode="json"), indent=2) + "\n" if as_json else plain_yaml(settings),
+        as_json=as_json,
+    )
 
 
 @config.command(examples=["cylx config check my.yaml", "cylx config check my.yaml && cylx extract scan.ply -c my.yaml"])
@@ -78,9 +81,10 @@ def check(*, file: str, as_json: bool) -> None:
         preset = load_config(path=file).preset
     except ConfigError as failure:
         if as_json:
-            answer(_verdict(file, None, _faults_of(failure, file)))
+            answer(_verdict(file, None, _faults_of(failure, file)), as_json=True)
         raise
-    answer(_verdict(file, preset, []) if as_json else f"{file}: valid, preset {preset}\n")
+    said = _verdict(file, preset, []) if as_json else f"{file}: valid, preset {preset}\n"
+    answer(said, as_json=as_json)
 
 
 def _verdict(file: str, preset: str | None, faults: Sequence[Mapping[str, object]]) -> str:
@@ -123,4 +127,4 @@ def schema(*, result: bool, rejected: bool) -> None:
         from cylx.config import Config
 
         document = Config.model_json_schema()
-    answer(json.dumps(document, indent=2) + "\n")
+    answer(json.dumps(document, indent=2) + "\n", as_json=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from cylx.cli.options.configuration import complete_files, debug_option, json_option
+from cylx.cli.options.numbers import NumberRange
 from cylx.cli.terminal.failures import answer, called_by_file
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.wording import counted
@@ -15,7 +16,7 @@ from cylx.wording import counted
 if TYPE_CHECKING:
     from cylx.evaluation import Difference
 
-_TOLERANCE = click.FloatRange(min=0)
+_TOLERANCE = NumberRange(min=0)
 
 
 @click.command(
@@ -50,7 +51,7 @@ def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
     with called_by_file({"a": a, "b": b}):
         comparison = compare(*documents, tolerances=Tolerances(**tolerances))
     if as_json:
-        answer(json.dumps(comparison.to_dict(), indent=2) + "\n")
+        answer(json.dumps(comparison.to_dict(), indent=2) + "\n", as_json=True)
     elif comparison.differences:
         header = ["what", "id in A", "id in B", "of", "A", "B", "difference", "tolerance"]
         show_table(header, [_row(difference) for difference in comparison.differences])

@@ -12,7 +12,6 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, metadata, version
-from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
@@ -57,7 +56,7 @@ def doctor(*, as_json: bool) -> None:
     works = all(check.state == "ok" for check in checks if check.needed)
     if as_json:
         content = {"works": works, "checks": [asdict(check) for check in checks]}
-        answer(json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+        answer(json.dumps(content, indent=2, ensure_ascii=False) + "\n", as_json=True)
     else:
         show_table(["what", "state", "detail", "remedy"], [[c.name, c.state, c.detail, c.remedy] for c in checks])
         answer("cylinders can be found\n" if works else "cylinders cannot be found: see what is missing or broken\n")
@@ -149,20 +148,24 @@ def check_libusb() -> Check:
 
 
 def check_kernels() -> Check:
-    """Check that the numerical kernels are compiled, and that the compiled code can be saved."""
+    """Check that the numerical kernels are compiled, that the compiled code can be saved, and that it is undamaged."""
     told = os.environ.get("NUMBA_CACHE_DIR")
     source = f"NUMBA_CACHE_DIR={told}" if told else "NUMBA_CACHE_DIR is not set"
     remedy = "set NUMBA_CACHE_DIR to a writable folder"
     try:
-        from cylx.api.warmup import kernel_folder, kernels_are_cold
+        from cylx.api.warmup import damaged_kernels, kernel_folder, kernels_are_cold, kernels_are_kept
 
-        folder = Path(kernel_folder())
+        folder, damaged = kernel_folder(), damaged_kernels()
         cold = kernels_are_cold()
-    except (ImportError, OSError, RuntimeError) as error:  # numba finds no cache folder
+    except (ImportError, OSError, RuntimeError) as error:
         return Check("kernels", "broken", f"{_first_line(error)}; {source}", remedy)
-    if not os.access(folder, os.W_OK):
-        fault = f"cannot be saved: {folder} is read-only; {source}"
-        return Check("kernels", "broken", f"{fault}; every run compiles them again", remedy, needed=False)
+    if not kernels_are_kept():
+        fault = "cannot be saved: " + (f"{folder} is read-only" if folder else "no folder is writable")
+        again = "every run compiles them again" if cold else "they are compiled"
+        return Check("kernels", "broken", f"{fault}; {source}; {again}", remedy, needed=False)
+    if damaged:
+        fault = f"{len(damaged)} damaged in {folder}: {', '.join(damaged[:3])}{', …' if damaged[3:] else ''}"
+        return Check("kernels", "broken", fault, "nothing to do: they are compiled again", needed=False)
     state = "were not compiled yet" if cold else "are compiled"
     return Check("kernels", "ok", f"{state}, and saved in {folder}; {source}")
 

@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 import click
 
 from cylx.cli.options.configuration import complete_files, debug_option, json_option
+from cylx.cli.options.numbers import NumberRange
 from cylx.cli.terminal.failures import answer, called_by_file, tell
 from cylx.cli.terminal.group import ExampleCommand
 
 if TYPE_CHECKING:
     from cylx.evaluation import Evaluation
 
-_SHARE = click.FloatRange(0, 1)
-_ERROR = click.FloatRange(min=0)
+_SHARE = NumberRange(0, 1)
+_ERROR = NumberRange(min=0)
 
 
 @click.command(
@@ -57,7 +58,7 @@ def evaluate(
         outcome = evaluation.evaluate(*documents, angle_deg=angle_deg, offset=offset, radius=radius)
     missed = list(missed_bars(outcome, bars))
     if as_json:
-        answer(json.dumps({**outcome.to_dict(), "bars_missed": missed}, indent=2) + "\n")
+        answer(json.dumps({**outcome.to_dict(), "bars_missed": missed}, indent=2) + "\n", as_json=True)
     else:
         answer(as_text(outcome))
     for line in missed:

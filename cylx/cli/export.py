@@ -11,6 +11,7 @@ from cylx.cli.batch.jobs import check_apart
 from cylx.cli.batch.meshes import drawing_of, remarks_on
 from cylx.cli.batch.summary import legible
 from cylx.cli.options.configuration import complete_files, debug_option, json_option, overwrite_option
+from cylx.cli.options.numbers import NumberRange
 from cylx.cli.options.units import units_option
 from cylx.cli.terminal.failures import answer, tell
 from cylx.cli.terminal.group import ExampleCommand
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 @click.argument("result", shell_complete=complete_files)
 @click.argument("outputs", metavar="OUT...", nargs=-1, required=True, shell_complete=complete_files)
 @units_option(".glb, .step, .ifc and .dxf need")
-@click.option("--min-confidence", type=click.FloatRange(0, 1), metavar="X", help="Leave out less certain cylinders.")
+@click.option("--min-confidence", type=NumberRange(0, 1), metavar="X", help="Leave out less certain cylinders.")
 @overwrite_option
 @json_option
 @debug_option
@@ -65,7 +66,7 @@ def export(
     write_together({name: exported.data for name, exported in written.items()}, overwrite=overwrite)
     _report(result, drawing, written)
     if as_json:
-        answer(json.dumps(_told(result, drawing, written), indent=2, ensure_ascii=False) + "\n")
+        answer(json.dumps(_told(result, drawing, written), indent=2, ensure_ascii=False) + "\n", as_json=True)
 
 
 def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[str, Any]:

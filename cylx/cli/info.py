@@ -52,7 +52,9 @@ def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
     facts["warnings"] = [asdict(caution) for caution in found]
     for caution in found:
         tell(f"warning: {cloud.source.file}: {caution}")
-    answer(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if as_json else as_text(facts))
+    for note in cloud.source.notes:
+        tell(f"note: {cloud.source.file}: {note}")
+    answer(json.dumps(facts, indent=2, ensure_ascii=False) + "\n" if as_json else as_text(facts), as_json=as_json)
 
 
 def look_ahead(whole: PointCloud, cloud: PointCloud, seed: int) -> tuple[dict[str, Any], list[Caution]]:

@@ -97,7 +97,7 @@ def reproduce(
         else:
             _show(figure, summaries)
     if as_json:
-        answer(json.dumps({"figures": told}, indent=2, ensure_ascii=False) + "\n")
+        answer(json.dumps({"figures": told}, indent=2, ensure_ascii=False) + "\n", as_json=True)
 
 
 class Study:

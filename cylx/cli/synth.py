@@ -155,4 +155,4 @@ def write_scene(out: str, scene: SyntheticScene, *, precision: str, overwrite: b
     if as_json:
         files = {"file": legible(out), "truth": legible(truth_path(out))}
         told = {**files, "points": len(scene.points), "cylinders": len(scene.cylinders)}
-        answer(json.dumps(told, indent=2, ensure_ascii=False) + "\n")
+        answer(json.dumps(told, indent=2, ensure_ascii=False) + "\n", as_json=True)

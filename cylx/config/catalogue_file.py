@@ -22,6 +22,7 @@ _MOST_BYTES = 100_000
 _SEPARATORS = "\t;,"
 _COLUMNS = ("name", "radius", "diameter", "tolerance")
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+_LONGEST_NUMBER = 100
 _EXAMPLE = "such as 'name,radius,tolerance'"
 
 Given = Sequence[Mapping[str, object] | CatalogueEntry | float]
@@ -148,7 +149,7 @@ def _header_of(line: str, place: str) -> _Table:
     """Read the header line."""
     separator = next((mark for mark in _SEPARATORS if mark in line), ",")
     columns = [cell.lower() for cell in _cells_of(line, separator, place)]
-    if any(_NUMBER.fullmatch(column) for column in columns):
+    if any(_is_number(column) for column in columns):
         raise ConfigError(place, "is not a header line", f"begin with a line that names the columns, {_EXAMPLE}")
     for column in columns:
         if column not in _COLUMNS:
@@ -192,13 +193,18 @@ def _cells_of(line: str, separator: str, place: str) -> list[str]:
 
 def _number(cell: str, column: str, place: str) -> float:
     """Read a number > 0."""
-    if not _NUMBER.fullmatch(cell):
-        remedy = f"write {cell.replace(',', '.')}" if _NUMBER.fullmatch(cell.replace(",", ".")) else "write digits"
+    if not _is_number(cell):
+        remedy = f"write {cell.replace(',', '.')}" if _is_number(cell.replace(",", ".")) else "write digits"
         raise ConfigError(place, f"the {column} {_shown(cell)} is not a number", remedy)
     number = float(cell)
     if not 0.0 < 0.5 * number < math.inf:
         raise ConfigError(place, f"the {column} {_shown(cell)} is out of range", "it must be > 0 and finite")
     return number
+
+
+def _is_number(cell: str) -> bool:
+    """Return whether a cell is a number; one of thousands of digits is none, and would take long to match."""
+    return len(cell) <= _LONGEST_NUMBER and _NUMBER.fullmatch(cell) is not None
 
 
 def _shown(cell: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, get_args
+from typing import TYPE_CHECKING, TypeGuard, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
@@ -65,8 +65,13 @@ def dotted_keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
     """Yield the dotted path of every key of a model, sections before their keys."""
     for name, field in model.model_fields.items():
         yield prefix + (field.alias or name)
-        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+        if _is_model(field.annotation):
             yield from dotted_keys(field.annotation, f"{prefix}{name}.")
+
+
+def _is_model(annotation: object) -> TypeGuard[type[BaseModel]]:
+    """Return whether an annotation is a model; for Python 3.10, `tuple[float, float]` is a type."""
+    return isinstance(annotation, type) and get_origin(annotation) is None and issubclass(annotation, BaseModel)
 
 
 def _fault_and_remedy(details: ErrorDetails, path: tuple[str, ...], model: type[BaseModel]) -> tuple[str, str]:
@@ -110,7 +115,7 @@ def _model_at(path: tuple[str, ...], model: type[BaseModel]) -> type[BaseModel]:
 
 def _model_in(annotation: object) -> type[BaseModel] | None:
     """Return the model in an annotation: the annotation itself, or the model of the entries of a list."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if _is_model(annotation):
         return annotation
     return next(filter(None, map(_model_in, get_args(annotation))), None)
 

@@ -57,6 +57,8 @@ def parse_yaml(text: str, place: str) -> object:
     except yaml.reader.ReaderError as error:
         fault = f"holds the character #x{error.character:04x}" if isinstance(error.character, int) else "is not text"
         raise ConfigError(place, fault, "give a YAML text file") from None
+    except (OverflowError, ValueError):  # of chr: an escape such as \UFFFFFFFF is no letter
+        raise ConfigError(place, "has an escape that is no letter", "write the letter itself") from None
 
 
 def entry_lines(text: str) -> list[int]:

@@ -121,7 +121,8 @@ def read_cylinders(document: Mapping[str, object], place: str, key: str = "cylin
                 numbers[row, i] = _number(entry[name], f"{here}.{name}")
         ids.append(_identity(entry.get("id", i), f"{here}.id"))
         ignore[i] = bool(entry.get("ignore", False))
-    lengths = np.linalg.norm(vectors[1], axis=1, keepdims=True)
+    with np.errstate(over="ignore", invalid="ignore"):  # a direction that is too long is unusable
+        lengths = np.linalg.norm(vectors[1], axis=1, keepdims=True)
     directions = np.divide(vectors[1], lengths, out=np.full((n, 3), np.nan), where=np.isfinite(lengths) & (lengths > 0))
     return CylinderTable(tuple(ids), vectors[0], directions, numbers[0], numbers[1], numbers[2], ignore)
 
@@ -136,6 +137,13 @@ def require_usable(table: CylinderTable, place: str, key: str = "cylinders") -> 
 
 def pair_errors(a: CylinderTable, b: CylinderTable) -> PairErrors:
     """Compute the errors of all pairs, row by row, which keeps the precision far from the origin and saves memory."""
+    with np.errstate(
+        over="ignore", invalid="ignore"
+    ):  # numbers near the largest: what is infinitely far matches nothing
+        return _pair_errors(a, b)
+
+
+def _pair_errors(a: CylinderTable, b: CylinderTable) -> PairErrors:
     angle, offset, shift = np.empty((3, len(a), len(b)))
     for i in range(len(a)):
         sine = np.linalg.norm(np.cross(a.directions[i], b.directions), axis=1)

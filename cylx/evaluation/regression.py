@@ -202,7 +202,8 @@ def _same_cylinders(
 ) -> dict[int, int]:
     """Return the position in b for positions in a: cylinders about the same axis and radius, side by side along it."""
     lengths = _lengths(left)[:, None], _lengths(right)
-    beside = 0.5 * (1 + np.minimum(*lengths) / np.maximum(*lengths))
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        beside = 0.5 * (1 + np.minimum(*lengths) / np.maximum(*lengths))
     limited = (
         (errors.angle_deg, max(_SAME_ANGLE_DEG, tolerances.angle_deg)),
         (errors.offset, max(_SAME_OFFSET, tolerances.offset)),

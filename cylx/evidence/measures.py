@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, coordinates_of
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import fill_basis
 from cylx.records import IndexedCloud, Segment
 

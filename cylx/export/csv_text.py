@@ -6,6 +6,7 @@ import csv
 import io
 
 from cylx.export.drawing import Drawing, Exported
+from cylx.harmless import cell
 from cylx.results.table import table_of
 
 
@@ -21,6 +22,6 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     table = table_of([cylinder.to_object() for cylinder in drawing.cylinders])
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(table)
-    writer.writerows(zip(*table.values(), strict=True))
+    writer.writerow(map(cell, table))
+    writer.writerows(map(cell, row) for row in zip(*table.values(), strict=True))
     return Exported(text.getvalue().encode())

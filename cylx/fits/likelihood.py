@@ -12,11 +12,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from cylx.fits.residual_law import BINS, Law, estimate_law
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import fill_basis
 
 MIXTURE_ROUNDS, STEPS_A_ROUND = 3, 5

@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.kernels import njit
 
 BINS = 240
 """Steps of the residual in which the distribution and the weights are tabulated."""

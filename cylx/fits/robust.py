@@ -12,10 +12,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import FINITE, REORDERED, fill_basis, solve_in_place
 
 TUKEY = 4.685

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
+from cylx.geometry.kernels import njit
 from cylx.records import Candidates, Segment
 
 LEAST_TELLING_SHARE = 0.4

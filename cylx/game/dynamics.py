@@ -8,9 +8,9 @@ every stable state is a single strategy, so the answer depends on when the itera
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.kernels import njit
 
 EXTINCT = 1e-9
 """A share of the final population below this counts as zero: replicators reach zero only in infinite time."""

@@ -7,13 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cylx.game.dynamics import SparsePayoff
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, UX, UY, UZ
 from cylx.geometry.dual_quaternions import pairwise_screw_distances
+from cylx.geometry.kernels import njit
 
 PIECE = 4096
 """Candidates per task of a thread."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import BITS, cell_starts
 
 RUNS_IN_BLOCK = 32

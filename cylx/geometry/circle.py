@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import REORDERED, solve_in_place
 
 

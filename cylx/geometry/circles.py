@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.kernels import njit
 
 NEAREST = 10
 """Points that show the tangent."""

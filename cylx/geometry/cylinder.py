@@ -7,10 +7,10 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import cross, fill_basis
 
 POINT, DIRECTION, RADIUS = slice(0, 3), slice(3, 6), 6

@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import REORDERED, solve_in_place
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import median_of_positive, sort_in_place
 
 ARC_BINS = 24

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import cross, symmetric_eigen
 
 LEAST_POINTS_OF_LINE = 8

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.geometry.kernels import njit
 
 BITS = 21
 """Bits per axis: 3 x 21 fit a signed 64-bit integer."""

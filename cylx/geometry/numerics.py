@@ -12,9 +12,9 @@ import math
 from typing import Final
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.kernels import njit
 
 REORDERED: Final = {"reassoc", "nsz", "arcp", "contract"}
 """Optimisations that the compiler may apply to sums; NaN and infinity keep their meaning."""

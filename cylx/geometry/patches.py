@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import gather_ball
 from cylx.geometry.numerics import fill_basis, solve_in_place, sort_in_place, symmetric_eigen
 from cylx.geometry.quadric import fill_osculating

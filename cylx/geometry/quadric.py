@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import RADIUS, UX
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import REORDERED, fill_basis, solve_in_place, symmetric_eigen
 
 

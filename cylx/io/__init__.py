@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from cylx.io.annotated import check_annotated as check_annotated
+    from cylx.io.annotated import las_obstacle as las_obstacle
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
@@ -23,11 +24,11 @@ if TYPE_CHECKING:
     from cylx.io.inputs import sha256_of as sha256_of
     from cylx.io.meshes import read_object as read_object
     from cylx.io.outputs import check_writable as check_writable
-    from cylx.io.outputs import remove_leftovers as remove_leftovers
-    from cylx.io.outputs import temporary_beside as temporary_beside
     from cylx.io.outputs import write_bytes as write_bytes
     from cylx.io.outputs import write_text as write_text
     from cylx.io.sizes import expected_points as expected_points
+    from cylx.io.staging import remove_leftovers as remove_leftovers
+    from cylx.io.staging import temporary_beside as temporary_beside
 
 _HOMES = {
     "LAS_SUFFIXES": "cylx.io.formats",
@@ -37,14 +38,15 @@ _HOMES = {
     "cloud_suffix": "cylx.io.formats",
     "cloud_suffixes": "cylx.io.clouds",
     "expected_points": "cylx.io.sizes",
+    "las_obstacle": "cylx.io.annotated",
     "printable": "cylx.io.inputs",
     "read_cloud": "cylx.io.clouds",
     "read_json": "cylx.io.inputs",
     "read_object": "cylx.io.meshes",
     "recorded_name": "cylx.io.clouds",
-    "remove_leftovers": "cylx.io.outputs",
+    "remove_leftovers": "cylx.io.staging",
     "sha256_of": "cylx.io.inputs",
-    "temporary_beside": "cylx.io.outputs",
+    "temporary_beside": "cylx.io.staging",
     "write_annotated": "cylx.io.annotated",
     "write_bytes": "cylx.io.outputs",
     "write_cloud": "cylx.io.clouds",

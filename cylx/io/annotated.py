@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import shutil
+import struct
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -11,11 +13,12 @@ import numpy as np
 
 from cylx.errors import OutputError
 from cylx.io.formats import LAS_SUFFIXES
-from cylx.io.inputs import excerpt, printable
+from cylx.io.inputs import excerpt
 from cylx.io.names import mended_names
 from cylx.io.outputs import open_output
 from cylx.io.pcd import write_pcd
 from cylx.io.ply import ROWS_AT_A_TIME, ply_type, write_ply
+from cylx.io.staging import known_name
 from cylx.palette import cylinder_colors
 
 if TYPE_CHECKING:
@@ -25,6 +28,9 @@ if TYPE_CHECKING:
 
     from cylx.records import Extraction, PointCloud
 
+_TRIED = 3
+_MOST_STEPS = 4.0
+"""A coordinate in double precision may be off by this many steps of its file."""
 _OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "blue": "u1"}
 
 
@@ -86,13 +92,51 @@ def check_annotated(path: str | Path, cloud: PointCloud) -> None:
     """
     suffix = Path(path).suffix.lower()
     if suffix in LAS_SUFFIXES and (cloud.source.header is None or cloud.table is None):
-        raise OutputError(printable(path), "the input is neither LAS nor LAZ", "choose a name that ends in .ply")
+        raise OutputError(known_name(path), "the input is neither LAS nor LAZ", "choose a name that ends in .ply")
+    obstacle = las_obstacle(path, cloud)
+    if obstacle:
+        raise OutputError(known_name(path), obstacle, "choose a name that ends in .ply")
     if suffix == ".pcd" and cloud.table is not None:
         dtype = cloud.table.dtype
         lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
         if lists:
             fault = f"PCD cannot hold the list property {excerpt(lists[0])}"
-            raise OutputError(printable(path), fault, "choose a name that ends in .ply")
+            raise OutputError(known_name(path), fault, "choose a name that ends in .ply")
+
+
+def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
+    """Return why a cloud from LAS or LAZ cannot be written as such again: tried with its first points.
+
+    Parameters
+    ----------
+    path : str or Path
+        Name of the annotated cloud.
+    cloud : PointCloud
+
+    Returns
+    -------
+    str
+        Empty if it can, or if it is to be written in another format, or is from neither.
+    """
+    header, table, suffix = cloud.source.header, cloud.table, Path(path).suffix.lower()
+    if suffix not in LAS_SUFFIXES or header is None or table is None:
+        return ""
+    from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
+
+    scales, offsets = struct.unpack_from("<3d", header, 131), struct.unpack_from("<3d", header, 155)
+    for axis, scale, offset in zip("xyz", scales, offsets, strict=True):
+        if np.spacing(max(np.abs(table[axis]).max(), abs(offset))) > _MOST_STEPS * abs(scale):
+            return f"the steps of {axis}, {scale:g}, are lost so far from the origin"
+    few = table[:_TRIED]
+    ours = {name: np.zeros(len(few), kind) for name, kind in _OURS.items()}
+    try:
+        write_las(io.BytesIO(), header, few, [(slice(0, len(few)), ours)], compressed=suffix == ".laz")
+    except MemoryError:
+        raise
+    except Exception as error:  # noqa: BLE001  laspy raises whatever it meets
+        fault = " ".join(str(error).split()) or type(error).__name__
+        return f"laspy cannot write this file again: {excerpt(fault, 100)}"
+    return ""
 
 
 def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:
@@ -148,13 +192,14 @@ def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray
 
 
 def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> None:
-    """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek."""
+    """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek, or has to be read again."""
     from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
+    from cylx.io.las_mend import has_letters  # noqa: PLC0415  for this alone
 
     header, table = extraction.cloud.source.header, extraction.cloud.table
     if header is None or table is None:
         raise ValueError("only clouds from LAS and LAZ can be written as such")
-    if file.seekable():
+    if file.seekable() and not has_letters(header):
         write_las(file, header, table, _findings(extraction), compressed=compressed)
         return
     with tempfile.TemporaryFile() as copy:

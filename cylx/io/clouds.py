@@ -16,6 +16,7 @@ from cylx.io.packed import unpacked
 from cylx.io.pcd import read_pcd, write_pcd
 from cylx.io.ply import ROWS_AT_A_TIME, ply_type, read_ply, write_ply
 from cylx.io.xyz import read_xyz, write_xyz
+from cylx.optional.extras import require
 from cylx.records import PointCloud, Selection, Source
 
 if TYPE_CHECKING:
@@ -57,10 +58,10 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
         if scan is not None and kind != "e57":
             raise InputError(source.place, "is not E57, so no scan can be chosen", "leave --scan out")
         try:
-            table, header = _read(source, kind, scan)
+            table, facts = _read(source, kind, scan)
         except MemoryError:
             raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
-        origin = Source(_file_name(path), kind, source.sha256, Selection(scan=scan), header)
+        origin = Source(_file_name(path), kind, source.sha256, Selection(scan=scan), **facts)
         return _cloud(table, source.place, origin)
 
 
@@ -122,22 +123,29 @@ def _file_name(path: str | Path) -> str:
     return str(path).encode("utf-8", "replace").decode()
 
 
-def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], bytes | None]:
-    """Read the table of a file, and the header of a LAS file; rarely needed readers are imported late."""
+def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], dict[str, Any]]:
+    """Read the table of a file, and what else its source says; rarely needed readers are imported late."""
     if kind == "las":
-        from cylx.io.las import read_las  # noqa: PLC0415  needs an extra, or for this alone
-        from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  needs an extra, or for this alone
+        from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
+        from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  for this alone
 
-        return read_las(source), kept_header(source, las_header(source))
+        facts = las_header(source)
+        libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
+        require(*libraries, place=source.place, needed_by="", error=InputError, imported=False)
+        return read_isolated(source, "las"), {"header": kept_header(source, facts), "doubts": facts.doubts}
     if kind == "e57":
-        from cylx.io.e57 import read_e57  # noqa: PLC0415  needs an extra, or for this alone
+        from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
 
-        return read_e57(source, scan), None
+        require("pye57", place=source.place, needed_by="", error=InputError, imported=False)
+        return read_isolated(source, "e57", scan=scan), {}
     if kind == "npy":
         from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone
 
-        return read_npy(source), None
-    return {"ply": read_ply, "pcd": read_pcd, "xyz": read_xyz}[kind](source), None
+        return read_npy(source), {}
+    if kind == "xyz":
+        table, columns = read_xyz(source)
+        return table, {"notes": columns.notes, "doubts": columns.doubts}
+    return {"ply": read_ply, "pcd": read_pcd}[kind](source), {}
 
 
 def _cloud(table: NDArray[np.void], place: str, source: Source) -> PointCloud:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cylx.errors import InputError
+from cylx.io.foreign import Foreign, foreign_content, foreign_suffix
 
 if TYPE_CHECKING:
     from cylx.io.inputs import Input
@@ -21,15 +22,19 @@ _CERTAIN = {
     ".npy": "npy",
     ".npz": "npy",
 }
+_ZIP = b"PK\x03\x04"
 _BEGINNINGS = {
     b"LASF": "las",
     b"ASTM-E57": "e57",
     b"\x93NUMPY": "npy",
-    b"PK\x03\x04": "npy",
-    b"ply\n": "ply",
-    b"ply\r": "ply",
-    **dict.fromkeys((b"# .PCD", b"#.PCD", b"VERSION", b"FIELDS"), "pcd"),
+    _ZIP: "npy",
+    **dict.fromkeys((b"ply\n", b"ply\r", b"ply "), "ply"),
+    **dict.fromkeys((b"# .PCD", b"#.PCD", b"# .pcd", b"VERSION", b"FIELDS", b"version 0.", b"version ."), "pcd"),
 }
+_HEAD = 1024
+_BOM = b"\xef\xbb\xbf"
+_WIDE_TEXT = (b"\xff\xfe", b"\xfe\xff")
+_ARCHIVES = (".zip", ".xlsx", ".docx", ".ods", ".odt", ".kmz", ".usdz", ".3mf", ".ifczip")
 
 
 def cloud_suffix(path: str | Path) -> str:
@@ -69,12 +74,23 @@ def recognise(source: Input, suffix: str) -> str:
     InputError
         If it is neither of a known format nor text.
     """
+    whole = source.head(_HEAD)
     if suffix in _CERTAIN:
+        foreign = foreign_content(whole)
+        if foreign is not None:
+            raise _unread(source, foreign)
         return _CERTAIN[suffix]
-    head = source.head(1024).lstrip()
+    head = whole.removeprefix(_BOM).lstrip()
     for beginning, kind in _BEGINNINGS.items():
-        if head.startswith(beginning):
+        if head.startswith(beginning) and not (beginning == _ZIP and suffix in _ARCHIVES):
             return kind
-    if suffix not in TEXT_SUFFIXES and b"\0" in head:
+    foreign = foreign_suffix(suffix) or foreign_content(whole)
+    if foreign is not None:
+        raise _unread(source, foreign)
+    if suffix not in TEXT_SUFFIXES and b"\0" in head and not whole.startswith(_WIDE_TEXT):
         raise InputError(source.place, "is neither text nor of a format that cylx reads", "convert it to PLY")
     return "xyz"
+
+
+def _unread(source: Input, foreign: Foreign) -> InputError:
+    return InputError(source.place, f"is {foreign.name}, which cylx does not read", foreign.remedy)

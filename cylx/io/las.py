@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import io
 import logging
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
 import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.las_header import LasFacts, las_header
+from cylx.io.las_mend import Spliced, mended
+from cylx.io.laz_chunks import check_chunks
 from cylx.io.names import mended_names
 from cylx.io.rows import short_of_points
 from cylx.optional.extras import require
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
     from cylx.io.inputs import Input
 
-_CHUNK = 1 << 19  # points read at a time
+    Allocate = Callable[[int, np.dtype[np.void]], NDArray[np.void]]
+
+_CHUNK = 1 << 19  # points read at a time, at the most, ...
+_BUFFER = 1 << 25  # ... and bytes
 _REMEDY = "get a complete copy of the file"
 
 
@@ -40,12 +46,14 @@ class Dimension:
         return values if self.element is None else values[:, self.element]
 
 
-def read_las(source: Input) -> NDArray[np.void]:
+def read_las(source: Input, *, allocate: Allocate = np.empty) -> NDArray[np.void]:
     """Read all points of a LAS or LAZ file.
 
     Parameters
     ----------
     source : Input
+    allocate : callable
+        Makes the table of a number of points and a type.
 
     Returns
     -------
@@ -62,7 +70,7 @@ def read_las(source: Input) -> NDArray[np.void]:
     libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
     require(*libraries, place=source.place, needed_by="", error=InputError)
     with quiet_laspy(), _told_apart(source.place):
-        return _read(source, facts)
+        return _read(source, facts, allocate)
 
 
 def las_dimensions(point_format: Any) -> list[Dimension]:  # noqa: ANN401  (of laspy)
@@ -90,20 +98,22 @@ def quiet_laspy() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
+def _read(source: Input, facts: LasFacts, allocate: Allocate) -> NDArray[np.void]:
     import laspy  # noqa: PLC0415  an extra
 
-    source.file.seek(0)
+    file = _mended_file(source, facts)
+    backend = None
     if facts.compressed:
-        _check_chunks(source, facts, laspy.LasHeader.read_from(source.file))
-        source.file.seek(0)
-    with laspy.open(source.file, closefd=False, read_evlrs=False) as reader:
+        parallel = check_chunks(source, facts, laspy.LasHeader.read_from(file))
+        backend = laspy.LazBackend.LazrsParallel if parallel else laspy.LazBackend.Lazrs
+        file.seek(0)
+    with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=backend) as reader:
         header = reader.header
         columns = las_dimensions(header.point_format)
         types = [*((axis, np.dtype("f8")) for axis in "xyz"), *((one.name, one.type) for one in columns)]
-        table = np.empty(facts.points, np.dtype(types))
+        table = allocate(facts.points, np.dtype(types))
         done = 0
-        for chunk in reader.chunk_iterator(_CHUNK):
+        for chunk in reader.chunk_iterator(min(_CHUNK, max(_BUFFER // header.point_format.size, 1))):
             part = table[done : done + len(chunk)]
             done += len(chunk)
             for axis, scale, offset in zip("xyz", header.scales, header.offsets, strict=True):
@@ -115,48 +125,23 @@ def _read(source: Input, facts: LasFacts) -> NDArray[np.void]:
     return table
 
 
-def _check_chunks(source: Input, facts: LasFacts, header: Any) -> None:  # noqa: ANN401  (of laspy)
-    """Check the table of compressed chunks: lazrs allocates memory for whatever numbers and sizes it gives."""
-    import lazrs  # noqa: PLC0415  an extra
-
-    record = lazrs.LazVlr(header.vlrs[header.vlrs.index("LasZipVlr")].record_data)
-    damaged = InputError(source.place, "the table of its compressed chunks is damaged", _REMEDY)
-    if record.item_size() != header.point_format.size:
-        raise damaged
-    source.file.seek(facts.start)
-    table = _whole(source)
-    if table == -1:  # its position was unknown when the points were written
-        source.file.seek(source.size - 8)
-        table = _whole(source)
-    if not facts.start + 8 <= table <= source.size - 8:
-        raise damaged
-    source.file.seek(table + 4)
-    count = int.from_bytes(source.file.read(4), "little")
-    size = record.chunk_size()
-    if count > (facts.points if record.uses_variable_size_chunks() else -(-facts.points // max(size, 1)) + 1):
-        raise damaged
-    source.file.seek(facts.start)
-    chunks = lazrs.read_chunk_table(source.file, record)
-    if any(length < 0 for _, length in chunks) or sum(length for _, length in chunks) > table - facts.start - 8:
-        raise damaged
-
-
-def _whole(source: Input) -> int:
-    return int.from_bytes(source.file.read(8), "little", signed=True)
+def _mended_file(source: Input, facts: LasFacts) -> BinaryIO:
+    """Return the file at its beginning, or one with a mended header if laspy needs one."""
+    head = source.head(facts.start)
+    better = mended(head, facts.points)
+    source.file.seek(0)
+    return source.file if better == head else cast("BinaryIO", io.BufferedReader(Spliced(better, source.file)))
 
 
 @contextmanager
 def _told_apart(place: str) -> Iterator[None]:
     """Turn exceptions of laspy and lazrs on a damaged file into an `InputError`."""
-    import laspy  # noqa: PLC0415  an extra
-
-    damaged: tuple[type[Exception], ...] = (laspy.errors.LaspyException, ValueError, KeyError, IndexError)
-    with suppress(ImportError):
-        import lazrs  # noqa: PLC0415  an extra
-
-        damaged += (lazrs.LazrsError,)
     try:
         yield
-    except damaged as error:
-        fault = " ".join(str(error).split()) or type(error).__name__
+    except (InputError, MemoryError):
+        raise
+    except BaseException as error:
+        if not isinstance(error, Exception) and type(error).__name__ != "PanicException":  # of Rust
+            raise
+        fault = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(place, f"broken LAS: {fault}", _REMEDY) from None

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from cylx.io.las import las_dimensions, quiet_laspy
+from cylx.io.las_mend import mended, restore
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _OURS = {"cylinder_id": "i4", "residual": "f4"}
+_NOT_KEPT = ("copc", "cylx_unused")
 _COLORS = ("red", "green", "blue")
 _FULL = 257  # colours of LAS have 16 bits
 _NO_DATE = date(1970, 1, 1)
@@ -50,7 +52,7 @@ def write_las(
     import laspy  # noqa: PLC0415  an extra
 
     with quiet_laspy():
-        header = laspy.LasHeader.read_from(io.BytesIO(kept), read_evlrs=True)
+        header = laspy.LasHeader.read_from(io.BytesIO(mended(kept, len(table))), read_evlrs=True)
         columns = las_dimensions(header.point_format)
         renamed = _prepare(header, table)
         with laspy.open(file, mode="w", header=header, closefd=False, do_compress=compressed) as writer:
@@ -70,6 +72,8 @@ def write_las(
                 writer.write_points(record)
             if header.evlrs:
                 writer.write_evlrs(header.evlrs)
+        file.seek(0, io.SEEK_END)
+        restore(file, kept)
 
 
 def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: ANN401  (of laspy)
@@ -88,11 +92,26 @@ def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: A
         renamed |= {f"{color}+": _new_name(color, taken) for color in _COLORS}
         params += [laspy.ExtraBytesParams(renamed[f"{color}+"], "u2") for color in _COLORS]
     header.add_extra_dims(params)
-    header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]
+    header.vlrs = [record for record in header.vlrs if record.user_id not in _NOT_KEPT]
+    header._version = _version(header)  # laspy refuses to set it while it does not fit
     header.creation_date = header.creation_date or _NO_DATE  # laspy would write today
     header.start_of_waveform_data_packet_record = 0
     header.global_encoding.waveform_data_packets_internal = False
     return renamed
+
+
+def _version(header: Any) -> Any:  # noqa: ANN401  (of laspy)
+    """Return the version of a header, or the first later one that has its point format."""
+    from laspy.header import Version  # noqa: PLC0415  an extra
+    from laspy.point.dims import VERSION_TO_POINT_FMT  # noqa: PLC0415  an extra
+
+    for version in sorted(VERSION_TO_POINT_FMT):
+        later = Version.from_str(version)
+        if (later.major, later.minor) >= (header.version.major, header.version.minor) and (
+            header.point_format.id in VERSION_TO_POINT_FMT[version]
+        ):
+            return later
+    return header.version
 
 
 def _is_colored(header: Any) -> bool:  # noqa: ANN401  (of laspy)

@@ -36,12 +36,22 @@ class LasFacts:
         Byte at which the points begin.
     evlrs : tuple of int
         Byte at which the records after the points begin, and their number.
+    uncounted : bool
+        Whether the header says 0 points, and the size of the file says how many there are.
     """
 
     points: int
     compressed: bool
     start: int
     evlrs: tuple[int, int]
+    uncounted: bool = False
+
+    @property
+    def doubts(self) -> tuple[tuple[str, str], ...]:
+        """What may have been read wrongly, and the remedy."""
+        if not self.uncounted:
+            return ()
+        return ((f"the header counts 0 points; {self.points} fit into the file and were read", "export it again"),)
 
 
 def las_header(source: Input) -> LasFacts:
@@ -65,21 +75,27 @@ def las_header(source: Input) -> LasFacts:
         if len(head) < _WITH_COUNT:
             raise InputError(place, "the file ends within the LAS header", _REMEDY)
         evlrs = struct.unpack_from("<QI", head, 235)
-        points = struct.unpack_from("<Q", head, 247)[0]
+        points = struct.unpack_from("<Q", head, 247)[0] or points
     if head[24] != 1 or kind & 0x3F > _LAST_FORMAT:
         fault = f"LAS {head[24]}.{minor} with point format {kind & 0x3F} is not known"
         raise InputError(place, fault, "export the file again as LAS 1.2 or 1.4")
     if start > source.size:
         raise InputError(place, "the file ends within the LAS header", _REMEDY)
+    if size < (_WITH_COUNT if minor >= 4 else _LEAST):
+        raise InputError(place, f"the LAS header of {size} bytes is too short for LAS 1.{minor}", _REMEDY)
     if size + _VLR * vlrs > start:
         raise InputError(place, f"the LAS header has no room for its {vlrs} records", _REMEDY)
+    compressed = kind & 0xC0 == 0x80
+    end = evlrs[0] if evlrs[1] and start <= evlrs[0] <= source.size else source.size
+    uncounted = points == 0
+    if uncounted and not compressed and width and (end - start) % width == 0:  # its writer was stopped
+        points = (end - start) // width
     if points == 0:
         raise InputError(place, "holds no points", "give a file with points")
     _check_scales(head, place)
-    compressed = kind & 0xC0 == 0x80
     if not compressed and (held := (source.size - start) // max(width, 1)) < points:
         raise short_of_points(place, points, held)
-    return LasFacts(points, compressed, start, evlrs)
+    return LasFacts(points, compressed, start, evlrs, uncounted)
 
 
 def kept_header(source: Input, facts: LasFacts) -> bytes:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def coordinate_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Find the properties x, y and z, in this order; capital letters are accepted if there are no small ones.
+    """Find the properties x, y and z, in this order; capital letters are accepted if the small ones are not complete.
 
     Returns
     -------
@@ -21,8 +21,12 @@ def coordinate_names(names: Iterable[str]) -> tuple[str, ...]:
     --------
     >>> coordinate_names(["intensity", "z", "X", "y"])
     ('X', 'y', 'z')
+    >>> coordinate_names(["x", "y", "X", "Y", "Z"])
+    ('X', 'Y', 'Z')
     """
     have = set(names)
+    if have >= set("XYZ") and not have >= set("xyz"):
+        return ("X", "Y", "Z")
     return tuple(name for axis in "xyz" for name in (axis, axis.upper()) if name in have and not _shadowed(name, have))
 
 
@@ -46,15 +50,17 @@ def mended_names(names: Sequence[str]) -> list[str]:
     >>> mended_names(["scan angle", "a", "a", ""])
     ['scan_angle', 'a', 'a_2', 'property']
     """
-    mended: list[str] = []
+    mended: dict[str, None] = {}
+    counts: dict[str, int] = {}
     for name in names:
         stem = re.sub(r"[^!-~]+", "_", name.strip()) or "property"
-        candidate, count = stem, 1
+        candidate, count = stem, counts.get(stem, 1)
         while candidate in mended:
             count += 1
             candidate = f"{stem}_{count}"
-        mended.append(candidate)
-    return mended
+        counts[stem] = count
+        mended[candidate] = None
+    return [*mended]
 
 
 def _shadowed(name: str, have: set[str]) -> bool:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import struct
 import tempfile
 import tokenize
 import warnings
 import zipfile
+import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,11 +22,32 @@ from cylx.io.rows import short_of_points
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+try:
+    from lzma import LZMAError
+except ImportError:  # Python without lzma: zipfile refuses such members
+    _OF_LZMA: tuple[type[Exception], ...] = ()
+else:
+    _OF_LZMA = (LZMAError,)
+
 _NPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"
 _MOST_COLUMNS = 1000
 _LYING = 9  # an array of three rows and more columns than this is probably transposed
 _ENOUGH = 1 << 20  # longer than any header
 _REMEDY = "save it again by numpy.save"
+_BROKEN = (
+    ValueError, TypeError, SyntaxError, tokenize.TokenError, RecursionError, LookupError, OverflowError, AttributeError,
+)  # fmt: skip
+"""What numpy raises on a damaged header."""
+_DAMAGED: tuple[type[Exception], ...] = (
+    zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error, ValueError, OverflowError,
+    struct.error, *_OF_LZMA,
+)  # fmt: skip
+"""What zipfile raises; RuntimeError is a password, ValueError a name that is not UTF-8."""
+_IMAGE_WIDTH, _NARROW = 33, 16
+_SQUARE = 16
+"""Numbers in this many times as many rows as columns, or fewer, are an image if there are enough columns."""
+_LONGEST = 120
+_MOST_ROWS = 1 << 48
 
 
 def read_npy(source: Input) -> NDArray[np.void]:
@@ -62,8 +85,9 @@ def _read_packed(source: Input) -> NDArray[np.void]:
             if part.head(6) != _NPY:
                 raise InputError(source.place, "holds a member that is not NPY", "save it again by numpy.savez")
             return _columns(_mapped(part), source.place)
-    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:  # RuntimeError: a password
-        raise InputError(source.place, f"is not a complete NPZ: {error}", "get a complete copy of the file") from None
+    except _DAMAGED as error:
+        fault = f"is not a complete NPZ: {_shortened(error)}"
+        raise InputError(source.place, fault, "get a complete copy of the file") from None
 
 
 def _member(names: list[str], place: str) -> str:
@@ -86,9 +110,10 @@ def _mapped(source: Input) -> NDArray[Any]:
             version = np.lib.format.read_magic(head)
             read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
             shape, fortran, dtype = read(head)
-    except (ValueError, TypeError, SyntaxError, tokenize.TokenError, RecursionError) as error:
-        fault = str(error).partition("\n")[0]
-        raise InputError(source.place, f"broken NPY header: {fault}", _REMEDY) from None
+    except (*_BROKEN, MemoryError) as error:  # MemoryError: brackets nested too deeply
+        raise InputError(source.place, f"broken NPY header: {_shortened(error)}", _REMEDY) from None
+    if not all(type(size) is int and 0 <= size < _MOST_ROWS for size in shape):
+        raise InputError(source.place, f"broken NPY header: the shape is {excerpt(str(shape))}", _REMEDY)
     if dtype.hasobject:
         raise InputError(source.place, "holds Python objects, which are not supported", "save an array of numbers")
     _check_kind(dtype, shape, source.place)
@@ -109,10 +134,25 @@ def _check_kind(dtype: np.dtype[Any], shape: tuple[int, ...], place: str) -> Non
     elif len(shape) != 2 or not 3 <= shape[1] <= _MOST_COLUMNS or (shape[0] == 3 and shape[1] > _LYING):
         remedy = "transpose it" if len(shape) == 2 and shape[0] == 3 else "give an array of shape (N, 3) or wider"
         raise InputError(place, f"has the shape {said}, not (N, 3)", remedy)
+    elif _is_image(dtype, shape):
+        fault = f"has the shape {said}, as an image of depths has"
+        raise InputError(place, fault, "compute its points from the focal length first")
     elif dtype.kind not in "iuf":
         raise InputError(place, f"is made of {dtype}, not of numbers", "give an array of floats")
     if shape[0] == 0:
         raise InputError(place, "holds no points", "give a file with points")
+
+
+def _is_image(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bool:
+    """Return whether an array of numbers has the shape of an image rather than of points and their properties."""
+    least = _NARROW if dtype.kind in "iu" else _IMAGE_WIDTH
+    return dtype.kind in "iuf" and shape[1] >= least and _LYING < shape[0] < _SQUARE * shape[1]
+
+
+def _shortened(error: BaseException) -> str:
+    """Return what an exception says, on one line that is not too long."""
+    text = " ".join(str(error).partition("\n")[0].split()) or type(error).__name__
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 
 def _columns(array: NDArray[Any], place: str) -> NDArray[np.void]:

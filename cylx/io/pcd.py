@@ -1,12 +1,14 @@
 """PCD: all fields of all points, in the order of the file.
 
 The header and the bodies `ascii` and `binary` are read here and not by open3d, which reads words as zeros, invents
-points that a short body lacks, and drops fields that it does not use. open3d unpacks `binary_compressed`.
+points that a short body lacks, and drops fields that it does not use. open3d unpacks
+`binary_compressed`, in a process of its own.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
@@ -15,16 +17,23 @@ from cylx.errors import InputError
 from cylx.io.inputs import Input, excerpt
 from cylx.io.names import coordinate_names, mended_names, missing_coordinates
 from cylx.io.rows import RowFormat, read_rows, short_of_points
+from cylx.optional.extras import is_found
 from cylx.optional.open3d import unpack_columns
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
+
+    Allocate = Callable[[int, np.dtype[np.void]], NDArray[np.void]]
 
 _TYPES = {
     **{("F", size): f"<f{size}" for size in (4, 8)},
     **{(kind, size): f"<{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)},
 }
 _KEYS = ("VERSION", "FIELDS", "SIZE", "TYPE", "COUNT", "WIDTH", "HEIGHT", "VIEWPOINT", "POINTS", "DATA")
+_ALIASES = {"COLUMNS": "FIELDS"}
+_BOM = b"\xef\xbb\xbf"
 _BODIES = ("ascii", "binary", "binary_compressed")
 _MOST_HEADER = 1 << 20
 _MOST_EXPANSION = 100  # LZF makes at most 264 bytes of 3
@@ -169,20 +178,18 @@ def _read_text(header: _Header, source: Input) -> NDArray[np.void]:
 
 def _read_packed(header: _Header, source: Input) -> NDArray[np.void]:
     source.file.seek(header.size)
-    body = source.file.read()
-    sizes = np.frombuffer(body[:8].ljust(8, b"\0"), "<u4").tolist()
-    if len(body) < 8 or sizes[0] > len(body) - 8:
+    held = source.size - header.size - 8
+    sizes = np.frombuffer(source.file.read(8).ljust(8, b"\0"), "<u4").tolist()
+    if held < 0 or sizes[0] > held:
         raise InputError(source.place, "the file ends within the compressed body", "get a complete copy of the file")
     if sizes[1] != header.points * header.width or sizes[1] > _MOST_EXPANSION * sizes[0]:
         fault = f"the body does not hold the {header.points} points that the header promises"
         raise InputError(source.place, fault, "get a complete copy of the file")
-    try:
-        flat = unpack_columns(body, header.points, header.width)
-    except ImportError:
-        remedy = "install open3d, or save the file as DATA binary"
-        raise InputError(source.place, "DATA binary_compressed needs open3d", remedy) from None
-    if flat is None:
-        raise InputError(source.place, "the compressed body is damaged", "get a complete copy of the file")
+    from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
+
+    if not is_found("open3d"):
+        raise _without_open3d(source)
+    flat = read_isolated(source, "pcd", start=header.size, points=header.points, width=header.width)["byte"]
     columns = header.columns()
     table = np.empty(header.points, np.dtype([(name, kind) for name, kind, _, _ in columns]))
     for name, kind, field, place in columns:
@@ -191,28 +198,73 @@ def _read_packed(header: _Header, source: Input) -> NDArray[np.void]:
     return table
 
 
+def unpack_body(source: Input, start: int, points: int, width: int, *, allocate: Allocate) -> NDArray[np.void]:
+    """Unpack a compressed body, whose sizes were checked; open3d does it, in the process that is made for it.
+
+    Parameters
+    ----------
+    source : Input
+    start : int
+        Byte at which the body begins.
+    points : int
+        Number of points.
+    width : int
+        Bytes per point.
+    allocate : callable
+        Makes the table of a number of bytes and a type.
+
+    Returns
+    -------
+    ndarray of shape (points * width,), structured
+        The field `byte`, see `unpack_columns`.
+
+    Raises
+    ------
+    InputError
+        If the body is damaged, or open3d does not run here.
+    """
+    source.file.seek(start)
+    try:
+        flat = unpack_columns(source.file.read(), points, width)
+    except ImportError:
+        raise _without_open3d(source) from None
+    if flat is None:
+        raise InputError(source.place, "the compressed body is damaged", "get a complete copy of the file")
+    table = allocate(len(flat), np.dtype([("byte", "u1")]))
+    table["byte"] = flat
+    return table
+
+
+def _without_open3d(source: Input) -> InputError:
+    remedy = "install open3d, or save the file as DATA binary"
+    return InputError(source.place, "DATA binary_compressed needs open3d", remedy)
+
+
 def _read_header(source: Input) -> _Header:
-    """Read the lines up to DATA and check them against each other."""
+    """Read the lines up to DATA and check them against each other; keys in small letters and unknown ones are fine."""
     head = source.head(_MOST_HEADER)
     said: dict[str, list[str]] = {}
-    start = number = 0
+    start = len(_BOM) if head.startswith(_BOM) else 0
+    number = 0
     while "DATA" not in said:
         stop = head.find(b"\n", start)
         if stop < 0:
             raise _unfinished(source, said)
         number += 1
-        words = head[start:stop].decode("utf-8", "backslashreplace").partition("#")[0].split()
+        line = head[start:stop].decode("utf-8", "backslashreplace").strip()
         start = stop + 1
-        if not words:
+        words = line.split()
+        if not words or line.startswith("#"):
             continue
-        key = "FIELDS" if words[0] == "COLUMNS" else words[0]
-        if key not in _KEYS:
-            if not said:
-                raise InputError(source.place, "is not PCD: it does not begin with its header", _SUFFIX_REMEDY)
+        key = _ALIASES.get(words[0].upper(), words[0].upper())
+        if key in _KEYS:
+            said[key] = words[1:] if key == "FIELDS" else line.partition("#")[0].split()[1:]
+        elif not said:
+            raise InputError(source.place, "is not PCD: it does not begin with its header", _SUFFIX_REMEDY)
+        elif not words[0].isidentifier() or (len(words) < 2 and not words[0].isupper()):
             fault = f"{excerpt(' '.join(words))} is not a line of a PCD header"
             raise InputError(f"{source.place}:{number}", fault, _REMEDY)
-        said[key] = words[1:]
-    body = " ".join(said["DATA"])
+    body = " ".join(said["DATA"]).lower()
     if body not in _BODIES:
         raise InputError(
             f"{source.place}:{number}", f"unknown DATA {excerpt(body)}", f"use one of {', '.join(_BODIES)}"
@@ -230,6 +282,8 @@ def _unfinished(source: Input, said: dict[str, list[str]]) -> InputError:
 
 def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
     names = said.get("FIELDS", [])
+    if len(names) != len(said.get("SIZE", names)):  # a `#` may begin a comment, or belong to a name
+        names = list(takewhile(lambda name: not name.startswith("#"), names))
     missing = missing_coordinates(names)
     if missing:
         raise InputError(place, f"FIELDS has no {missing}", "give a PCD with x, y and z")
@@ -239,8 +293,10 @@ def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
     for key, values in (("SIZE", sizes), ("TYPE", kinds), ("COUNT", counts)):
         if len(values) != len(names):
             raise InputError(place, f"{len(names)} FIELDS, but {key} has {len(values)}", _REMEDY)
-    if sum(counts) > _MOST_COLUMNS:
-        raise InputError(place, f"expected at most {_MOST_COLUMNS} values per point, found {sum(counts)}", _REMEDY)
+    most = max(sum(counts), len(names))
+    if most > _MOST_COLUMNS:
+        raise InputError(place, f"expected at most {_MOST_COLUMNS} values per point, found {most}", _REMEDY)
+    coordinates = coordinate_names(names)
     fields: list[_Field] = []
     offset = 0
     for name, kind, size, count in zip(names, kinds, sizes, counts, strict=True):
@@ -248,7 +304,7 @@ def _fields(said: dict[str, list[str]], place: str) -> list[_Field]:
             raise InputError(
                 place, f"field {excerpt(name)} has the unknown type {excerpt(kind)} of size {size}", _REMEDY
             )
-        if name in coordinate_names(names) and count != 1:
+        if name in coordinates and count != 1:
             raise InputError(place, f"field {name} has {count} values", "give a PCD with one x, y and z per point")
         fields.append(_Field(name, _TYPES[kind.upper(), size], count, offset))
         offset += fields[-1].width

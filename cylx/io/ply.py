@@ -64,7 +64,7 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
     from plyfile import PlyData, PlyElement  # noqa: PLC0415  slow to import
 
     def document(rows: NDArray[np.void]) -> PlyData:
-        lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
+        lists = [name for name in rows.dtype.names or () if rows.dtype[name].kind == "O"]
         types = {name: np.asarray(rows[name][0]).dtype.str[1:] for name in lists if len(rows)}
         element = PlyElement.describe(rows, "vertex", len_types=dict.fromkeys(lists, "u4"), val_types=types)
         return PlyData([element], byte_order="<")
@@ -73,9 +73,21 @@ def write_ply(file: BinaryIO, dtype: np.dtype[np.void], count: int, blocks: Iter
     first = next(pieces, np.empty(0, dtype))
     file.write(document(np.broadcast_to(first[:1], count)).header.encode() + b"\n")
     for block in chain([first], pieces):
-        part, body = document(block), io.BytesIO()
+        if not any(dtype[name].kind == "O" for name in dtype.names or ()):
+            file.write(block.tobytes())
+            continue
+        part, body = document(_renamed(block)), io.BytesIO()
         part.write(body)
-        file.write(body.getbuffer()[len(part.header) + 1 :])
+        file.write(body.getvalue()[len(part.header) + 1 :])
+
+
+def _renamed(rows: NDArray[np.void]) -> NDArray[np.void]:
+    """Return rows with other names: plyfile cannot write the values of one that has a colon."""
+    names = rows.dtype.names or ()
+    out = np.empty(len(rows), np.dtype([(f"p{place}", rows.dtype[name]) for place, name in enumerate(names)]))
+    for place, name in enumerate(names):
+        out[f"p{place}"] = rows[name]
+    return out
 
 
 def ply_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
@@ -105,9 +117,30 @@ def _read_with_plyfile(header: Header, source: Input) -> NDArray[np.void]:
         with warnings.catch_warnings(), np.errstate(all="ignore"):
             warnings.simplefilter("ignore")  # about an empty list
             warnings.simplefilter("error", DeprecationWarning)  # numpy 1 reads 300 as the uchar 44
-            return np.asarray(PlyData.read(stream)["vertex"].data)
+            return _with_long_integers(np.asarray(PlyData.read(stream)["vertex"].data), header)
     except (PlyParseError, ValueError, OverflowError, DeprecationWarning) as error:
         raise InputError(source.place, f"broken PLY: {error}", "get a complete copy of the file") from None
+
+
+def _with_long_integers(table: NDArray[np.void], header: Header) -> NDArray[np.void]:
+    """Give integers of 8 bytes, which plyfile took for doubles, their type."""
+    kinds = [TYPES[item.type] for item in header.vertex.properties]
+    long = [name for name, kind in zip(table.dtype.names or (), kinds, strict=True) if kind in ("i8", "u8")]
+    if not long:
+        return table
+    types = dict(zip(table.dtype.names or (), kinds, strict=True))
+    fields = [
+        (name, table.dtype[name].str[0] + types[name] if name in long else table.dtype[name])
+        for name in table.dtype.names or ()
+    ]
+    out = np.empty(len(table), np.dtype(fields))
+    for name in table.dtype.names or ():
+        column = table[name]
+        if name in long and not header.text:
+            column = np.ascontiguousarray(column).view(out.dtype[name])
+        with np.errstate(all="ignore"):
+            out[name] = column
+    return out
 
 
 class _Spliced:

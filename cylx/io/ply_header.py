@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -33,7 +34,19 @@ TYPES = {
     "uint32": "u4",
     "float32": "f4",
     "float64": "f8",
+    "bool": "u1",
+    "int64": "i8",
+    "uint64": "u8",
+    "long": "i8",
+    "ulong": "u8",
+    "longlong": "i8",
+    "ulonglong": "u8",
 }
+STANDARD = {"bool": "uchar"} | dict.fromkeys(("int64", "uint64", "long", "ulong", "longlong", "ulonglong"), "double")
+"""Types of PLY with the size of those that it has not."""
+_MOST_PROPERTIES = 1 << 12
+_FIRST = re.compile(rb"ply[ \t]*(\r\n|\n|\r|\Z)")
+_BOM = b"\xef\xbb\xbf"
 _MOST_HEADER = 1 << 20
 _REMEDY = "export the file again as PLY 1.0"
 
@@ -69,7 +82,11 @@ class Element:
     def lines(self) -> list[str]:
         """Return the lines of the element in a header."""
         names = mended_names([item.name for item in self.properties])
-        types = [f"list {item.length} {item.type}" if item.length else item.type for item in self.properties]
+        kinds = [STANDARD.get(item.type, item.type) for item in self.properties]
+        types = [
+            f"list {STANDARD.get(item.length, item.length)} {kind}" if item.length else kind
+            for item, kind in zip(self.properties, kinds, strict=True)
+        ]
         return [
             f"element {self.name} {self.count}",
             *(f"property {kind} {name}" for kind, name in zip(types, names, strict=True)),
@@ -140,10 +157,12 @@ def _read_lines(source: Input) -> Header:
 def _header_lines(source: Input) -> Iterator[tuple[int, int, str]]:
     """Yield number, end and text of each line of the header, which may end in LF, CR LF or CR."""
     head = source.head(_MOST_HEADER)
-    if head[:3] != b"ply" or head[3:4] not in (b"\n", b"\r", b""):
+    start = len(_BOM) if head.startswith(_BOM) else 0
+    first = _FIRST.match(head, start)
+    if first is None:
         raise InputError(source.place, "is not PLY: it does not begin with the line 'ply'", "give it its right suffix")
-    newline = b"\r" if head[3:4] == b"\r" and head[4:5] != b"\n" else b"\n"
-    start = number = 0
+    newline = b"\r" if first[1] == b"\r" else b"\n"
+    number = 0
     while (stop := head.find(newline, start)) >= 0:
         number += 1
         line = head[start:stop].decode("utf-8", "backslashreplace").strip()
@@ -170,15 +189,19 @@ def _element(words: list[str], where: str) -> Element:
 
 
 def _property(words: list[str], where: str) -> Property:
+    if len(words) == 3 and words[:2] in (["long", "long"], ["unsigned", "long"]):
+        words = [{"long": "longlong", "unsigned": "ulong"}[words[0]], words[2]]
     if len(words) == 2 and words[0] in TYPES:
         return Property(words[1], words[0])
-    if len(words) == 4 and words[0] == "list" and words[1] in TYPES and words[2] in TYPES:
+    if len(words) == 4 and words[0] == "list" and words[1] in TYPES and words[1] not in STANDARD and words[2] in TYPES:
         return Property(words[3], words[2], words[1])
     raise InputError(where, f"{excerpt(' '.join(words))} is not a property type and name", _REMEDY)
 
 
 def _check_vertex(vertex: Element, place: str) -> None:
     names = [item.name for item in vertex.properties]
+    if len(names) > _MOST_PROPERTIES:
+        raise InputError(place, f"expected at most {_MOST_PROPERTIES} properties, found {len(names)}", _REMEDY)
     missing = missing_coordinates(names)
     if missing:
         raise InputError(place, f"the vertex element has no property {missing}", "give a PLY with x, y and z")
@@ -188,6 +211,9 @@ def _check_vertex(vertex: Element, place: str) -> None:
     for item in vertex.properties:
         if item.length and item.name in coordinate_names(names):
             raise InputError(place, f"the property {item.name} is a list", "give a PLY with one x, y and z per point")
+        if item.length and STANDARD.get(item.type) == "double":
+            fault = f"the list property {excerpt(item.name)} is made of {item.type}"
+            raise InputError(place, fault, "leave it out, or write it as int")
     if vertex.count == 0:
         raise InputError(place, "holds no points", "give a file with points")
 

@@ -7,19 +7,36 @@ import warnings
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import islice
-from typing import TYPE_CHECKING, Any
+from operator import itemgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.inputs import Input, excerpt
+from cylx.io.cells import (
+    COMMENTS,
+    DECIMAL_COMMA,
+    SHARP,
+    all_cells,
+    check_number,
+    is_count,
+    is_missing,
+    plain_number,
+    split_row,
+    uncommented,
+)
+from cylx.io.inputs import Input
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
-COMMENTS = ("#", "//")
+LONGEST_LINE = 1 << 20
+"""Letters of a line: more than any table of points has."""
+_BLOCK = 1 << 20
+_END = "\x1a"
+"""What ends a text of DOS."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +59,18 @@ class RowFormat:
         Separator of the columns; None for white space.
     commented : bool
         Whether `#` and `//` begin a comment.
+    encoding : str
+        Of the text.
+    kept : tuple of int, optional
+        Which columns are read, ascending, if not all of them.
+    columns : int, optional
+        Number of columns of the text, if it is not that of the fields.
+    promised : int, optional
+        Number of rows that a line above the first row promised. Lines of a count between the rows add to it.
+    header : str
+        The line of names, which may come again.
+    loose : bool
+        Whether an empty value is missing (NaN), and a comma may be the decimal mark.
     """
 
     dtype: np.dtype[np.void]
@@ -51,6 +80,17 @@ class RowFormat:
     count: int | None = None
     delimiter: str | None = None
     commented: bool = False
+    encoding: str = "utf-8-sig"
+    kept: tuple[int, ...] | None = None
+    columns: int | None = None
+    promised: int | None = None
+    header: str = ""
+    loose: bool = False
+
+    @property
+    def width(self) -> int:
+        """Number of columns of the text."""
+        return len(self.dtype.names or ()) if self.columns is None else self.columns
 
 
 def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
@@ -72,12 +112,10 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
         fewer rows than `rows.count`.
     """
     most = _most_rows(source, rows)
-    try:
-        with text_lines(source, rows.offset) as lines:
-            table = _load(lines, rows, rows.delimiter, most)
-    except (ValueError, DeprecationWarning):
+    table = _read_fast(source, rows, most)
+    if table is None:
         # The fast reader failed. The slower one finds the line that is wrong; if none is, it returns the rows.
-        with text_lines(source, rows.offset) as lines:
+        with text_lines(source, rows.offset, rows.encoding) as lines:
             table = _load(_checked(lines, rows, source.place), rows, None, most)
     if rows.count is not None and len(table) < rows.count:
         raise short_of_points(source.place, rows.count, len(table))
@@ -93,61 +131,88 @@ def short_of_points(place: str, promised: int, found: int, *, at_most: bool = Fa
 
 
 @contextmanager
-def text_lines(source: Input, offset: int = 0) -> Iterator[io.TextIOWrapper]:
-    """Yield the lines of a text from a byte on, with any line ends; bytes that are not UTF-8 are escaped."""
+def text_lines(source: Input, offset: int = 0, encoding: str = "utf-8-sig") -> Iterator[io.TextIOWrapper]:
+    """Yield the lines of a text from a byte on, with any line ends; bytes that are no text are escaped."""
     source.file.seek(offset)
-    lines = io.TextIOWrapper(source.file, encoding="utf-8-sig", errors="backslashreplace")
+    lines = io.TextIOWrapper(source.file, encoding=encoding, errors="backslashreplace")
     try:
         yield lines
     finally:
         lines.detach()
 
 
-def uncommented(line: str) -> str:
-    """Remove a comment from a line, and white space from both ends.
+def _read_fast(source: Input, rows: RowFormat, most: int | None) -> NDArray[np.void] | None:
+    """Read rows by numpy alone, or with a little help; None if they need a closer look."""
+    plain = rows.kept is None and not (rows.commented and _is_sharp(source, rows))
+    for helped in (False, True):
+        if not (rows.loose if helped else plain):
+            continue
+        try:
+            with text_lines(source, rows.offset, rows.encoding) as lines:
+                if helped:
+                    table = _load(_picked(lines, rows), rows, None, most)
+                else:
+                    table = _load(_short(lines), rows, rows.delimiter, most)
+        except (ValueError, DeprecationWarning):
+            continue
+        if rows.promised is not None and rows.promised != len(table):
+            raise wrong_count(source.place, rows.promised, len(table))
+        return table
+    return None
 
-    Examples
-    --------
-    >>> uncommented(" 1 2 3  // the corner")
-    '1 2 3'
+
+def _picked(lines: Iterable[str], rows: RowFormat) -> Iterator[str]:
+    """Yield the columns of numbers with decimal points, up to the first line that needs a closer look.
+
+    Raises
+    ------
+    ValueError
+        At that line.
     """
-    for mark in COMMENTS:
-        line = line.partition(mark)[0]
-    return line.strip()
+    pick = None if rows.kept is None else itemgetter(*rows.kept)
+    yield from ("\n" for _ in range(rows.skip))
+    commas = points = False
+    for line in islice(lines, rows.skip, None):
+        if len(line) > LONGEST_LINE or '"' in line or "#" in line or "//" in line:
+            raise ValueError("a closer look is needed")
+        cells = line.split(rows.delimiter)
+        if len(cells) != rows.width:
+            if line.strip():
+                raise ValueError("a closer look is needed")
+            continue
+        text = " ".join(cells if pick is None else pick(cells))
+        commas, points = commas or "," in text, points or "." in text
+        if commas and (points or rows.delimiter == ","):
+            raise ValueError("a closer look is needed")
+        yield text.replace(",", ".")
 
 
-def split_row(line: str, delimiter: str | None) -> list[str]:
-    """Split a row into its columns; a delimiter at the end adds no column.
-
-    Examples
-    --------
-    >>> split_row("1; 2;3;", ";")
-    ['1', '2', '3']
-    """
-    if delimiter is None:
-        return line.split()
-    columns = [column.strip() for column in line.split(delimiter)]
-    return columns[:-1] if columns[-1] == "" else columns
+def _short(lines: Iterable[str]) -> Iterator[str]:
+    """Yield the lines up to one that is too long: numpy would take many times its size."""
+    for line in lines:
+        if len(line) > LONGEST_LINE:
+            raise ValueError("the line is too long")
+        yield line
 
 
-def is_number(text: str, dtype: np.dtype[Any] | None = None) -> bool:
-    """Return whether a text is a number that fits a type.
-
-    Examples
-    --------
-    >>> is_number("-1.5e3"), is_number("1_000"), is_number("256", np.dtype("u1"))
-    (True, False, False)
-    """
-    if "_" in text or not text.isascii():
-        return False
-    try:
-        if dtype is None or dtype.kind == "f":
-            float(text)
+def _is_sharp(source: Input, rows: RowFormat) -> bool:
+    """Return whether a `#` of the text belongs to a number."""
+    width = rows.encoding.removeprefix("utf-")
+    codes = [rows.encoding] if width not in ("16", "32") else [f"{rows.encoding}-le", f"{rows.encoding}-be"]
+    marks = [SHARP.encode("utf-8" if width == "8-sig" else code) for code in codes]
+    source.file.seek(rows.offset)
+    before = b""
+    while block := source.file.read(_BLOCK):
+        if any(mark in before + block for mark in marks):
             return True
-        limits = np.iinfo(dtype)
-        return limits.min <= int(text) <= limits.max
-    except ValueError:
-        return False
+        before = block[1 - len(marks[0]) :]
+    return False
+
+
+def wrong_count(place: str, promised: int, found: int) -> InputError:
+    """Return the error for a count of rows that is not theirs."""
+    fault = f"the count in the first line is {promised}, the file holds {found} points"
+    return InputError(place, fault, "get a complete copy of the file, or correct the count")
 
 
 def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: int | None) -> NDArray[np.void]:
@@ -167,35 +232,81 @@ def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: in
 
 def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]:
     """Yield the lines with one space between columns, up to the first wrong line, which raises."""
-    names = rows.dtype.names or ()
     yield from ("\n" for _ in range(rows.skip))
+    promised, found, marks = rows.promised, 0, ""
     for number, line in enumerate(islice(lines, rows.skip, None), rows.line + rows.skip):
-        columns = split_row(uncommented(line) if rows.commented else line.strip(), rows.delimiter)
-        if not columns:
+        where = f"{place}:{number}"
+        if len(line) > LONGEST_LINE:
+            raise InputError(where, "the line is too long for a row", "give every point a line")
+        columns = _row_of(line, rows)
+        if not columns or (rows.header and line.strip() == rows.header):
             continue
-        if len(columns) != len(names):
-            fault = f"expected {len(names)} columns, found {len(columns)}"
-            raise InputError(f"{place}:{number}", fault, "give every row the same columns")
-        for name, column in zip(names, columns, strict=True):
-            check_number(f"{place}:{number}", name, column, rows.dtype[name])
-        yield " ".join(columns)
+        if rows.loose and len(columns) == 1 < rows.width and is_count(columns[0]):
+            if found == (promised or 0):  # another block begins
+                promised = found + int(columns[0])
+                continue
+            if promised is None and int(columns[0]) == found:  # the count stands below the rows
+                promised = found
+                continue
+        if len(columns) != rows.width:
+            fault = f"expected {rows.width} columns, found {len(columns)}"
+            raise InputError(where, fault, "give every row the same columns")
+        values = columns if rows.kept is None else [columns[place] for place in rows.kept]
+        if rows.loose:
+            values = ["" if is_missing(value) else value for value in values]
+        marks = _one_mark(marks, values, where)
+        values = [plain_number(value) for value in values]
+        yield " ".join(_filled(values, rows, where))
+        found += 1
+    if promised is not None and promised != found:
+        raise wrong_count(place, promised, found)
 
 
-def check_number(where: str, name: str, column: str, dtype: np.dtype[Any] | None = None) -> None:
-    """Refuse a column that is not a number.
+def _row_of(line: str, rows: RowFormat) -> list[str]:
+    """Return the columns of a line, without its comment; a mark within a name begins none."""
+    row = uncommented(line) if rows.commented else line.strip()
+    if row == _END:
+        return []
+    for text in (row,) if rows.kept is None else dict.fromkeys((row, line.strip())):
+        columns = all_cells(text, rows.delimiter)
+        if columns and columns[-1] == "" and len(columns) != rows.width:
+            columns.pop()
+        if len(columns) == rows.width and row:
+            return columns
+    return split_row(row, rows.delimiter) if row else []
+
+
+def _one_mark(before: str, values: Iterable[str], where: str) -> str:
+    """Return the decimal mark of a file so far; refuse a second one.
 
     Raises
     ------
     InputError
-        If it is not a number.
+        If a row has a comma for a decimal mark, and another row or value a point.
     """
-    if not is_number(column, dtype):
-        kind = "a number" if dtype is None or dtype.kind == "f" else f"a number of type {dtype.name}"
-        fault = f"{name} is {excerpt(column)}, not {kind}" if column else f"{name} is empty"
-        raise InputError(where, fault, "write numbers like -1.5 or 2e-3")
+    numbers = (value for value in values if SHARP not in value)
+    marks = {"," if "," in value else "." for value in numbers if DECIMAL_COMMA.fullmatch(value) or "." in value}
+    if len(marks | set(before)) > 1:
+        raise InputError(where, "some numbers have a decimal comma, others a point", "write all of them with a point")
+    return before or "".join(marks)
+
+
+def _filled(values: list[str], rows: RowFormat, where: str) -> list[str]:
+    """Return the values of a row, checked; where values may be missing, NaN for those that are."""
+    names = rows.dtype.names or ()
+    nowhere = not any(value for name, value in zip(names, values, strict=True) if name in ("x", "y", "z"))
+    out = []
+    for name, value in zip(names, values, strict=True):
+        if not value and rows.loose and (nowhere or name not in ("x", "y", "z")):  # a point has all three, or none
+            out.append("nan")
+            continue
+        kind = rows.dtype[name]
+        check_number(where, name, value, kind)
+        out.append(str(int(value)) if kind.kind in "iu" else value)  # numpy refuses -0 and +1
+    return out
 
 
 def _most_rows(source: Input, rows: RowFormat) -> int | None:
     """Return the number of rows to allocate, or None if the file is too small for it: two bytes per column."""
-    room = (source.size - rows.offset + 1) // (2 * len(rows.dtype.names or ()))
+    room = (source.size - rows.offset + 1) // (2 * max(len(rows.dtype.names or ()), 1))
     return rows.count if rows.count is not None and rows.count <= room else None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
+from importlib.util import find_spec
 from typing import NamedTuple
 
 from cylx.errors import CylxError, UsageError
@@ -37,7 +38,13 @@ LIBRARIES = {
 """Optional libraries by import name."""
 
 
-def require(*libraries: str, place: str, needed_by: str | None = None, error: type[CylxError] = UsageError) -> None:
+def require(
+    *libraries: str,
+    place: str,
+    needed_by: str | None = None,
+    error: type[CylxError] = UsageError,
+    imported: bool = True,
+) -> None:
     """Refuse what needs libraries that are not installed, and name the command that installs them.
 
     Parameters
@@ -50,13 +57,15 @@ def require(*libraries: str, place: str, needed_by: str | None = None, error: ty
         What needs them, if the error shall say so; it may be empty where the place says it.
     error : type
         An error of an input, or of usage.
+    imported : bool
+        Whether they are imported; otherwise only looked for, as another process will import them.
 
     Raises
     ------
     CylxError
         If one of them cannot be imported.
     """
-    missing = [name for name in libraries if not _is_there(name)]
+    missing = [name for name in libraries if not (_is_there(name) if imported else is_found(name))]
     if not missing:
         return
     fault = f"{'is' if len(missing) == 1 else 'are'} not installed"
@@ -71,3 +80,11 @@ def _is_there(library: str) -> bool:
     except ImportError:
         return False
     return True
+
+
+def is_found(library: str) -> bool:
+    """Return whether a library is installed, without importing it."""
+    try:
+        return find_spec(library) is not None
+    except (ImportError, ValueError):
+        return False

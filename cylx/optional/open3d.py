@@ -8,7 +8,8 @@ import os
 import sys
 import tempfile
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,6 +46,8 @@ def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
     ImportError
         If open3d is not installed, or does not run here.
     """
+    if not _is_somewhere():
+        os.chdir(os.sep)  # a library of open3d ends the process where the working folder has been removed
     with contextlib.suppress(ImportError, OSError):
         import libusb_package  # noqa: PLC0415  not everywhere
 
@@ -53,6 +56,13 @@ def import_open3d() -> Any:  # noqa: ANN401  (it has no types)
         warnings.simplefilter("ignore")
         import open3d  # noqa: PLC0415  takes a second
     return open3d
+
+
+def _is_somewhere() -> bool:
+    try:
+        return bool(Path.cwd())
+    except FileNotFoundError:
+        return False
 
 
 def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | None:
@@ -86,13 +96,9 @@ def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | 
     header = _HEADER.format(
         fields=" ".join(names), ones=" ".join("1" * width), kinds=" ".join("U" * width), points=points
     )
-    with tempfile.TemporaryDirectory(prefix="cylx-") as folder:
-        path = Path(folder) / "body.pcd"
-        with path.open("wb") as file:
-            file.write(header.encode())
-            file.write(body)
-        with open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error):
-            cloud = open3d.t.io.read_point_cloud(str(path), format="pcd", remove_nan_points=False)
+    silent = open3d.utility.VerbosityContextManager(open3d.utility.VerbosityLevel.Error)
+    with _file_of(header.encode(), body) as path, silent:
+        cloud = open3d.t.io.read_point_cloud(str(path), format="pcd", remove_nan_points=False)
     if "positions" not in cloud.point or len(cloud.point.positions) != points:
         return None
     columns = np.empty((width, points), dtype=np.uint8)
@@ -100,6 +106,22 @@ def unpack_columns(body: bytes, points: int, width: int) -> NDArray[np.uint8] | 
     for place in range(3, width):
         columns[place] = cloud.point[names[place]].numpy()[:, 0]
     return columns.reshape(-1)
+
+
+@contextmanager
+def _file_of(*parts: bytes) -> Iterator[Path]:
+    """Yield the path of a file for the time being: in memory on Linux, so that nothing is left if this is killed."""
+    with contextlib.ExitStack() as stack:
+        if hasattr(os, "memfd_create"):
+            file = stack.enter_context(os.fdopen(os.memfd_create("body"), "wb"))
+            path = Path(f"/proc/self/fd/{file.fileno()}")
+        else:
+            path = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="cylx-"))) / "body.pcd"
+            file = stack.enter_context(path.open("wb"))
+        for part in parts:
+            file.write(part)
+        file.flush()
+        yield path
 
 
 def estimate_normals(points: NDArray[np.float64], neighbours: int) -> NDArray[np.float64]:

@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.bounding_box import extent_of
 from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import POINT, RADIUS, UX, UY, UZ, Cylinder
+from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import sort_in_place
 from cylx.records.sources import ARRAY, Source
 

@@ -69,6 +69,10 @@ class Source:
         Which of its points are used.
     header : bytes or None
         The parts of a LAS file besides the points, so that it can be written again.
+    notes : tuple of str
+        What a reader should know about how the file was read, one line each.
+    doubts : tuple of (str, str)
+        What may have been read wrongly, and the remedy.
     """
 
     file: str
@@ -76,6 +80,8 @@ class Source:
     sha256: str | None = None
     selection: Selection = Selection()
     header: bytes | None = None
+    notes: tuple[str, ...] = ()
+    doubts: tuple[tuple[str, str], ...] = ()
 
 
 ARRAY = Source("<array>", "array")

@@ -1,6 +1,9 @@
 // The rest of the page: table, details, sections, and the wires between them and the view. All texts come in as text.
 
-const facts = JSON.parse(document.getElementById("data").textContent);
+const hidden = /[\p{Cc}\p{Cf}\p{Cs}\p{Zl}\p{Zp}]/gu; // what a name of others may use to turn or hide text
+const escaped = (letter) => `\\u{${letter.codePointAt(0).toString(16)}}`;
+const facts = JSON.parse(document.getElementById("data").textContent, (_, value) =>
+  typeof value === "string" ? value.replace(hidden, escaped) : value);
 const { result, view, maps } = facts;
 const cylinders = result.cylinders;
 const byId = (id) => document.getElementById(id);

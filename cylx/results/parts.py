@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from cylx.harmless import visible
+
 if TYPE_CHECKING:
     from cylx.records import Extraction, Selection
 
@@ -112,5 +114,5 @@ def plain_numbers(vector: Iterable[float]) -> list[float]:
 
 
 def text_of(content: Mapping[str, Any]) -> str:
-    """Return the text of a JSON file, with a newline at its end."""
-    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    """Return the text of a JSON file, with a newline at its end; characters that do not print are escaped."""
+    return visible(json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False), keep="\n") + "\n"

@@ -7,10 +7,11 @@ input, configuration and seed give the same bytes.
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, ValidationError
+from pydantic import ConfigDict, Field, JsonValue, ValidationError, field_validator
 
 from cylx.config import describe_fault
 from cylx.config.choices import Method
@@ -82,6 +83,13 @@ class Result(Part):
     """Arcs that go on tangentially, with the keys of a cylinder; absent if they were not looked for."""
     warnings: list[str]
     """What a user should know before trusting the result."""
+
+    @field_validator("config")
+    @classmethod
+    def _check_config(cls, config: dict[str, Any]) -> dict[str, Any]:
+        if not _is_finite(config):
+            raise ValueError("holds a number that is not finite; give the file as cylx wrote it")
+        return config
 
     @classmethod
     def of(cls, extraction: Extraction) -> Result:
@@ -179,6 +187,13 @@ class Result(Part):
 def result_schema() -> dict[str, Any]:
     """Return the JSON schema of the result file."""
     return Result.model_json_schema(by_alias=True)
+
+
+def _is_finite(value: object) -> bool:
+    """Return whether all numbers in plain data are finite."""
+    if isinstance(value, dict | list):
+        return all(map(_is_finite, value.values() if isinstance(value, dict) else value))
+    return not isinstance(value, float) or math.isfinite(value)
 
 
 def _stage(report: StageReport) -> Stage:

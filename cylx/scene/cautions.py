@@ -22,6 +22,12 @@ KEYS = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
 """Odd numbers without a pattern; they hash three coordinates to one number."""
 COPIES = 0.2
 """From this share of duplicate points on, the measured spacing is too small by a tenth or more."""
+MANY = 1000
+"""This many copies are worth a word …"""
+FEW_COPIES = 0.005
+"""… unless they are a smaller share than this."""
+FEWEST_ZEROS = 10
+"""Fewer points at the origin than this may have been measured there."""
 STRAY_DISTANCE = 5.0
 """Strays are this many times as far out as all others."""
 MOST_STRAYS = 0.2
@@ -87,7 +93,14 @@ def damage(cloud: PointCloud, scene: Scene) -> list[Caution]:
     points = cloud.points[:: max(1, len(cloud.points) // COORDINATES_SAMPLED)]
     steps = [step_of(points[:, d]) for d in range(3)]
     coarse = _coarse(points, steps, scene)
-    found = [coarse, None if coarse else _copies(cloud.points, min(steps), scene), _noisy(scene)]
+    read = [Caution("columns", fault, remedy) for fault, remedy in cloud.source.doubts]
+    found = [
+        *read,
+        coarse,
+        None if coarse else _copies(cloud.points, min(steps), scene),
+        _zeros(cloud.points),
+        _noisy(scene),
+    ]
     return [caution for caution in found if caution is not None]
 
 
@@ -155,18 +168,35 @@ def _coarse(points: FloatArray, steps: list[float], scene: Scene) -> Caution | N
 
 
 def _copies(points: FloatArray, step: float, scene: Scene) -> Caution | None:
-    """Return a caution if there are duplicate points; in a large cloud a sample of keys is used."""
+    """Return a caution if there are many duplicate points; in a large cloud they are estimated from a sample of keys.
+
+    Rows of zeros are no duplicates of each other: `_zeros` counts them.
+    """
     keys = np.zeros(len(points), np.uint64)
     for d, factor in enumerate(KEYS):
         keys += (points[:, d] + 0.0).view(np.uint64)  # + 0.0 turns -0.0 into 0.0
         keys *= np.uint64(factor)
         keys ^= keys >> np.uint64(29)
-    some = np.sort(keys[keys % np.uint64(max(1, len(keys) // COORDINATES_SAMPLED)) == 0])
+    sampled = np.uint64(max(1, len(keys) // COORDINATES_SAMPLED))
+    some = np.sort(keys[(keys % sampled == 0) & (keys != 0)])
     share = np.count_nonzero(some[1:] == some[:-1]) / max(len(some), 1)
-    if share <= COPIES + (step / scene.spacing) ** 2:  # in cells as wide as a step, some points coincide by chance
+    count = round(share * np.count_nonzero(keys))
+    by_chance = (step / scene.spacing) ** 2  # in cells as wide as a step, some points coincide by chance
+    if share <= COPIES + by_chance and (count < MANY or share <= FEW_COPIES + 3.0 * by_chance):
         return None
-    fault = f"{share:.0%} of the points are copies of others, and count as if they had been measured"
+    about = "" if sampled == 1 else "about "
+    many = f"{about}{count} of {len(points)} points ({share:.0%})"
+    fault = f"{many} are copies of others, and count as if they had been measured"
     return Caution("copies", fault, f"leave them out by --voxel {scene.spacing / 20:.2g}")
+
+
+def _zeros(points: FloatArray) -> Caution | None:
+    """Return a caution if points lie exactly at the origin: many drivers write zeros where nothing was measured."""
+    count = len(points) - int(np.count_nonzero(points.any(axis=1)))
+    if count < FEWEST_ZEROS:
+        return None
+    fault = f"{count} of {len(points)} points are (0, 0, 0), as some programs write where nothing was measured"
+    return Caution("zeros", fault, "write NaN there, or leave these rows out")
 
 
 def _noisy(scene: Scene) -> Caution | None:

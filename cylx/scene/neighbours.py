@@ -6,9 +6,9 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import gather_ball
 from cylx.geometry.numerics import sort_in_place
 

@@ -6,9 +6,9 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import BITS, cell_starts, gather_ball
 from cylx.scene.noise_patches import MAD_SHRINKAGE, core_spread, half_sample_mode, quadric_spread
 

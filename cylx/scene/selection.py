@@ -52,7 +52,7 @@ def select(cloud: PointCloud, selection: Selection) -> PointCloud:
     if selection.classes is not None:
         keep &= np.isin(_classes_of(cloud)[rows], selection.classes)
     if selection.every is not None:
-        keep &= rows % selection.every == 0
+        keep &= rows % min(selection.every, cloud.rows) == 0
     if not keep.any():
         low, high = (_corner(corner) for corner in (cloud.points.min(axis=0), cloud.points.max(axis=0)))
         raise InputError(cloud.source.file, "no point is selected", f"select more; the points lie from {low} to {high}")

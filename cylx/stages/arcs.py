@@ -21,7 +21,7 @@ REACH = 2.5
 ENOUGH_OF_PROFILE = 4000
 """Points of it that suffice."""
 LEAST_DEVIATION = 0.004
-"""Deviation of the points about a profile, in radii, at least."""
+"""Deviation of the points, in radii, from which they hide where an arc ends; of less, their normals show it."""
 LEAST_GAIN = 12.0
 """A profile replaces the fit if its squared residuals are smaller by so many squared deviations."""
 MOST_CHI_SQUARE = 2.0
@@ -59,7 +59,9 @@ def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], 
 def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
     """Fit an arc and the planes that touch it as one; None if these are not there."""
     model, half, radius = segment.model, segment.half, segment.radius
-    deviation = max(indexed.noise_about(model, half), LEAST_DEVIATION * radius)
+    deviation = indexed.noise_about(model, half)
+    if deviation < LEAST_DEVIATION * radius:
+        return None
     near = indexed.cells.near_cylinder(model, -half, half, 0.0, REACH * radius)
     near = near[:: 1 + len(near) // ENOUGH_OF_PROFILE]
     if len(near) == 0:

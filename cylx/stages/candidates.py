@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import cell_starts, gather_ball, thin
 from cylx.records import Candidates, EllipseFit, Frame
 

@@ -11,12 +11,12 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, UX, UZ
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.numerics import fill_basis
 from cylx.geometry.quadric import fit_plane, osculating_cylinder

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from cylx.config import EllipsesConfig
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.ellipse import Degenerate, search_ellipse
+from cylx.geometry.kernels import njit
 from cylx.records import EllipseFit, Slice
 
 

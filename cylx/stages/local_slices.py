@@ -11,7 +11,6 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 
 from cylx.config import SlicingConfig
 from cylx.fits.robust import move_to_foot, polish
@@ -19,6 +18,7 @@ from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.circle import search_circle
 from cylx.geometry.cylinder import RADIUS, UX
 from cylx.geometry.ellipse import conic_shape, search_conic
+from cylx.geometry.kernels import njit
 from cylx.geometry.lines import fit_line, off_line
 from cylx.geometry.morton import gather_ball
 from cylx.geometry.numerics import fill_basis

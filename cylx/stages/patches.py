@@ -12,12 +12,12 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
 from cylx.fits.robust import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.patches import SIZE, TERMS, choose_patches, find_planar, fit_patches, osculating_of
 from cylx.records import Candidates, Explained, Frame, Nearby, StageReport

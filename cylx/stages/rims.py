@@ -11,10 +11,10 @@ import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.circles import LEAST_ON, fill_circle
+from cylx.geometry.kernels import njit
 from cylx.geometry.morton import cell_starts, gather_ball
 from cylx.geometry.numerics import fill_basis, symmetric_eigen
 from cylx.records import Candidates, Explained, Frame, Nearby, StageReport

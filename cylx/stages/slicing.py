@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from cylx.config import SlicingConfig
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import canonical_direction
+from cylx.geometry.kernels import njit
 from cylx.geometry.plane import Plane, random_directions
 from cylx.records import Frame, Slice, stream
 

@@ -74,18 +74,22 @@ def test_a_library_that_fails_when_it_is_imported_is_broken(tmp_path, monkeypatc
 def test_kernels_that_cannot_be_kept_are_told_of(monkeypatch, tmp_path):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     assert doctor.check_kernels().detail.endswith(f"NUMBA_CACHE_DIR={tmp_path}")
-    monkeypatch.setattr("os.access", lambda *_: False)
+    monkeypatch.setattr("cylx.api.warmup.kernels_are_kept", lambda: False)
     check = doctor.check_kernels()
     assert (check.state, check.needed) == ("broken", False)
     assert check.remedy == "set NUMBA_CACHE_DIR to a writable folder"
-
-    def nowhere():
-        raise RuntimeError("cannot cache function 'find_cell': no locator available")
-
-    monkeypatch.setattr("cylx.api.warmup.kernel_folder", nowhere)
+    monkeypatch.setattr("cylx.api.warmup.kernel_folder", lambda: None)
     check = doctor.check_kernels()
-    assert (check.state, check.needed) == ("broken", True)
-    assert check.detail.startswith("cannot cache function 'find_cell': no locator available; ")
+    assert check.detail.startswith("cannot be saved: no folder is writable; ")
+
+
+def test_damaged_kernels_are_named(monkeypatch):
+    monkeypatch.setattr("cylx.api.warmup.damaged_kernels", lambda: ["a.nbc", "b.nbc", "c.nbc", "d.nbc"])
+    check = doctor.check_kernels()
+    assert (check.state, check.needed) == ("broken", False)
+    assert check.detail.startswith("4 damaged in ")
+    assert check.detail.endswith(": a.nbc, b.nbc, c.nbc, …")
+    assert check.remedy == "nothing to do: they are compiled again"
 
 
 @pytest.mark.parametrize(

@@ -136,7 +136,7 @@ def test_files_are_replaced_when_that_is_asked_for_and_all_or_none(run_cylx, tmp
 
     with monkeypatch.context() as patch:
         patch.setattr("cylx.io.outputs.write_bytes", fail_on_the_second)
-        assert run_cylx("export", PIPES, tmp_path / "a.csv", tmp_path / "b.csv", "--overwrite").exit_code == 1
+        assert run_cylx("export", PIPES, tmp_path / "a.csv", tmp_path / "b.csv", "--overwrite").exit_code == 4
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
     assert (tmp_path / "a.csv").read_text(encoding="utf-8") == "old"
     assert run_cylx("export", PIPES, tmp_path / "a.csv", "--overwrite").exit_code == 0

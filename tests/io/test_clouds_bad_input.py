@@ -143,7 +143,8 @@ TEXT = {
     b"1 2 3\n4 five 6\n": f"scan:2: y is 'five', not a number; {NUMBERS}",
     b"x,y,z,label\n1,2,3,4\n1,2,3,wall\n": f"scan:3: label is 'wall', not a number; {NUMBERS}",
     b"1,2,3\n4,,6\n": f"scan:2: y is empty; {NUMBERS}",
-    b"1,5;2,5;3,5\n": f"scan:1: x is '1,5', not a number; {NUMBERS}",
+    b"1,5;2,5;3.5\n": "scan:1: some numbers have a decimal comma, others a point; write all of them with a point",
+    b"1,5;2,5;1.003,5\n": f"scan:1: z is '1.003,5', not a number; {NUMBERS}",
     b"1 2 3\n4 5 " + b"x" * 50 + b"\n": f"scan:2: z is '{'x' * 37}...', not a number; {NUMBERS}",
     b"1 2 3\n4 5 \xff\n": f"scan:2: z is '\\\\xff', not a number; {NUMBERS}",
     b"1 2 3\n4 5 1_000\n": f"scan:2: z is '1_000', not a number; {NUMBERS}",
@@ -159,7 +160,7 @@ TEXT = {
     "get a complete copy of the file, or correct the count",
     b"1 " * 1001: f"scan:1: expected at most 1000 columns, found 1001; {ROWS}",
     b"1 2 3\n\0\0\0": "scan: is not text; give a PLY, a PCD, or rows of x y z as text",
-    "1 2 3".encode("utf-16"): "scan: is UTF-16 text; save it as UTF-8",
+    "1 2 x".encode("utf-16"): f"scan:1: z is 'x', not a number; {NUMBERS}",
     b"nan nan nan\n": NO_FINITE,
 }
 OTHER = {

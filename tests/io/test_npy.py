@@ -2,6 +2,7 @@
 
 import io
 import zipfile
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -70,6 +71,7 @@ def test_it_is_recognised_by_its_content(put, run_cylx, tmp_path):
         assert shown.stdout.splitlines()[1:3] == ["format   npy", "points   50, 50 of them finite"]
 
 
+DEPTHS = "as an image of depths has; compute its points from the focal length first"
 WRONG = {
     "one row": (POINTS[0], "has the shape (3,), not (N, 3); give an array of shape (N, 3) or wider"),
     "lying": (POINTS.T, "has the shape (3, 50), not (N, 3); transpose it"),
@@ -89,6 +91,19 @@ WRONG = {
         np.zeros(5, [("x", "f8"), ("y", "f8"), ("z", "f8"), ("who", "U5")]),
         "the field 'who' is made of <U5, not of numbers; leave it out",
     ),
+    "depths": (
+        np.zeros((48, 64), "u2"),
+        f"has the shape (48, 64), {DEPTHS}",
+    ),
+    "depths in metres": (
+        np.ones((480, 640), "f4"),
+        f"has the shape (480, 640), {DEPTHS}",
+    ),
+    "depths, upright": (
+        np.ones((640, 480), "f4"),
+        f"has the shape (640, 480), {DEPTHS}",
+    ),
+    "truths": (POINTS > 0, "is made of bool, not of numbers; give an array of floats"),
     "grid": (
         np.zeros((5, 5), [("x", "f8"), ("y", "f8"), ("z", "f8")]),
         "is a structured array of shape (5, 5), not (N,); flatten it",
@@ -154,3 +169,52 @@ def test_a_header_that_promises_too_much_takes_no_memory(tmp_path):
     (tmp_path / "scan.npy").write_bytes(data.replace(b" " * 9 + b"\n", b"\n"))
     with pytest.raises(InputError):
         read_cloud(tmp_path / "scan.npy")
+
+
+def with_shape(text):
+    """Write the header of an array by hand."""
+    head = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {text}, }}"
+    head += " " * (117 - len(head)) + "\n"
+    return b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode() + bytes(240)
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [
+        "(-1, 3)",
+        "(10, -3)",
+        "(True, 3)",
+        f"({10**30}, 3)",
+        f"(1, {2**63})",
+        "(1.5, 3)",
+        "'ab'",
+        "3",
+    ],
+)
+def test_impossible_shapes_are_one_line(tmp_path, shape):
+    (tmp_path / "scan.npy").write_bytes(with_shape(shape))
+    with pytest.raises(InputError) as refused:
+        read_cloud(tmp_path / "scan.npy")
+    assert len(str(refused.value).removeprefix(str(tmp_path))) < 200
+    assert str(refused.value).isprintable()
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_damage_to_packed_arrays_is_one_line(tmp_path, method):
+    with zipfile.ZipFile(tmp_path / "whole.npz", "w", method) as archive:
+        archive.writestr("points.npy", npy())
+    data = (tmp_path / "whole.npz").read_bytes()
+    assert np.array_equal(read_cloud(tmp_path / "whole.npz").points, POINTS)
+    for place in range(30, 120):
+        (tmp_path / "cut.npz").write_bytes(data[:place] + bytes([data[place] ^ 0x55]) + data[place + 1 :])
+        with suppress(InputError):
+            read_cloud(tmp_path / "cut.npz")
+
+
+def test_a_name_that_is_not_utf_8_is_one_line(tmp_path):
+    with zipfile.ZipFile(tmp_path / "scan.npz", "w") as archive:
+        archive.writestr("pünkte.npy", npy())
+    data = (tmp_path / "scan.npz").read_bytes().replace("ü".encode(), b"\xff\xfe")
+    (tmp_path / "scan.npz").write_bytes(data)
+    with pytest.raises(InputError, match="is not a complete NPZ"):
+        read_cloud(tmp_path / "scan.npz")

@@ -13,7 +13,7 @@ import pytest
 
 from cylx.errors import OutputError
 from cylx.io import check_writable, write_bytes, write_cloud, write_text
-from cylx.io.outputs import open_output
+from cylx.io.outputs import open_output, write_together
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="the system has no such things")
 POINTS = np.array([[1, 2, 3], [4, 5, 6.5]])
@@ -156,15 +156,35 @@ def test_permissions_are_those_of_any_new_file(at_home):
 
 
 @POSIX
-def test_a_symbolic_link_is_followed(at_home):
+@pytest.mark.parametrize("there", [True, False], ids=["to a file", "to nothing"])
+def test_a_symbolic_link_is_replaced_and_not_followed(at_home, there):
     (at_home / "elsewhere").mkdir()
-    (at_home / "link.txt").symlink_to(at_home / "elsewhere" / "real.txt")
-    write_bytes("link.txt", b"1")
+    real = at_home / "elsewhere" / "real.txt"
+    if there:
+        real.write_bytes(b"theirs")
+    (at_home / "link.txt").symlink_to(real)
+    with pytest.raises(OutputError, match="exists already"):
+        write_bytes("link.txt", b"1")
     write_bytes("link.txt", b"2", overwrite=True)
-    assert (at_home / "link.txt").is_symlink()
-    assert names(at_home / "elsewhere") == ["real.txt"]
-    assert (at_home / "elsewhere" / "real.txt").read_bytes() == b"2"
+    write_together({"link.txt": b"3"}, overwrite=True)
+    assert not (at_home / "link.txt").is_symlink()
+    assert (at_home / "link.txt").read_bytes() == b"3"
+    assert names(at_home / "elsewhere") == (["real.txt"] if there else [])
+    assert not there or real.read_bytes() == b"theirs"
     assert names(at_home) == ["elsewhere", "link.txt"]
+
+
+@POSIX
+def test_a_link_to_a_device_is_replaced_and_a_link_in_the_folder_is_a_folder(at_home):
+    (at_home / "device.txt").symlink_to("/dev/full")
+    write_together({"device.txt": b"1"}, overwrite=True)
+    assert (at_home / "device.txt").read_bytes() == b"1"
+    (at_home / "real").mkdir()
+    (at_home / "folder").symlink_to("real")
+    write_bytes("folder/out.txt", b"2")
+    assert (at_home / "real" / "out.txt").read_bytes() == b"2"
+    with pytest.raises(OutputError, match="is a folder"):
+        write_bytes("folder", b"3", overwrite=True)
 
 
 @POSIX

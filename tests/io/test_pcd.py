@@ -198,3 +198,42 @@ def test_written_clouds_are_read_by_open3d_and_by_us(tmp_path, dtype):
     assert np.array_equal(theirs.positions.numpy(), FAR.astype(dtype))
     assert theirs.label.numpy()[:, 0].tolist() == ours.table["label"].tolist() == [-1, 0, 7]
     assert np.array_equal(ours.points, FAR.astype(dtype))
+
+
+def driver_pcd(body="binary", keys=str, data="DATA", extra=""):
+    """Write two points with padding before, between and behind x, y, z, and a count of 0, as drivers do."""
+    counts, sizes = [4, 1, 1, 1, 0, 1, 3], [1, 4, 4, 4, 4, 2, 1]
+    lines = {
+        "VERSION": "0.7", "FIELDS": "_ x y z _ Scalar_field_#2 _", "SIZE": " ".join(map(str, sizes)),
+        "TYPE": "U F F F U U U", "COUNT": " ".join(map(str, counts)), "WIDTH": "2", "HEIGHT": "1",
+        "VIEWPOINT": "0 0 0 1 0 0 0", "POINTS": "2", data: body,
+    }  # fmt: skip
+    header = "# .PCD v0.7\n" + extra + "".join(f"{keys(key)} {value}\n" for key, value in lines.items())
+    if body.lower() == "ascii":
+        return (header + "".join(f"9 9 9 9 {k} {k + 1} {k + 2} {k + 7} 8 8 8\n" for k in (1, 4))).encode()
+    rows = [bytes(4) + struct.pack("<fffH", k, k + 1, k + 2, k + 7) + bytes(3) for k in (1, 4)]
+    return header.encode() + b"".join(rows)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        driver_pcd(),
+        driver_pcd("ascii"),
+        driver_pcd("BINARY", str.lower),
+        driver_pcd(extra="VERSION .7\nFRAME_ID map\nSCALE 1 1 1\nTIMESTAMP\n# a remark\n\n"),
+        b"\xef\xbb\xbf" + driver_pcd("ascii"),
+        driver_pcd().replace(b"POINTS 2", b"POINTS 2 # two").replace(b"WIDTH 2", b"WIDTH 2 # wide"),
+    ],
+    ids=["binary", "ascii", "small letters", "unknown keys", "byte order mark", "remarks"],
+)
+def test_clouds_as_drivers_and_cloudcompare_write_them(read, data):
+    cloud = read(data)
+    assert cloud.points.tolist() == [[1, 2, 3], [4, 5, 6]]
+    assert cloud.table.dtype.names == ("x", "y", "z", "Scalar_field_#2")
+    assert cloud.table["Scalar_field_#2"].tolist() == [8, 11]
+
+
+def test_a_remark_behind_the_fields_is_no_field(read):
+    data = b"VERSION .7\nFIELDS x y z # of points\nSIZE 4 4 4\nTYPE F F F\nWIDTH 1\nHEIGHT 1\nDATA ascii\n1 2 3\n"
+    assert read(data).points.tolist() == [[1, 2, 3]]

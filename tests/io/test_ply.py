@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from plyfile import PlyData, PlyElement
 
+from cylx.errors import InputError
 from cylx.io import read_cloud, write_cloud
 
 SCALARS = ["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"]
@@ -186,3 +187,56 @@ def test_written_clouds_are_read_by_plyfile(tmp_path, dtype):
 def test_a_cloud_of_nothing_is_a_file_with_a_header(tmp_path):
     write_cloud(tmp_path / "none.ply", np.empty((0, 3)))
     assert PlyData.read(tmp_path / "none.ply")["vertex"].count == 0
+
+
+XYZ = "property float x\nproperty float y\nproperty float z\n"
+LONG = [("x", "f4"), ("y", "f4"), ("z", "f4"), ("t", "i8"), ("id", "u8"), ("ok", "u1")]
+MANY = np.array([(1, 2, 3, -(2**62) - 1, 2**63 + 1, 1), (4, 5, 6, 7, 8, 0)], LONG)
+NAMED = XYZ + "property int64 t\nproperty unsigned long id\nproperty bool ok\n"
+
+
+@pytest.mark.parametrize("near", ["", "property list uchar int near\n"], ids=["", "a list"])
+@pytest.mark.parametrize("encoding", ENCODINGS)
+def test_integers_of_8_bytes_and_booleans_are_read(read, encoding, near):
+    kind = {"ascii": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[encoding]
+    header = f"ply \t\nformat {kind} 1.0\nelement vertex 2\n{NAMED}{near}end_header\n"
+    if encoding == "ascii":
+        exact = 8 if near else 2**63 + 1  # plyfile reads text as doubles
+        body = f"1 2 3 {-(2**62) if near else -(2**62) - 1} {exact} 1{' 1 5' if near else ''}\n"
+        body = f"{body}4 5 6 7 8 0{' 0' if near else ''}\n".encode()
+    else:
+        rows = MANY.astype([(name, kind if kind == "u1" else encoding + kind) for name, kind in LONG])
+        body = b"".join(row.tobytes() + (b"\0" if near else b"") for row in rows)
+    table = read(b"\xef\xbb\xbf" + header.encode() + body).table
+    assert [table.dtype[name].kind for name in ("t", "id", "ok")] == ["i", "u", "u"]
+    assert table["ok"].tolist() == [1, 0]
+    assert table["t"][1] == 7
+    if not (near and encoding == "ascii"):
+        assert table["t"].tolist() == MANY["t"].tolist()
+        assert table["id"].tolist() == MANY["id"].tolist()
+
+
+def test_long_integers_of_faces_do_not_matter(read):
+    face = struct.pack("<Bqqq", 3, 0, 1, 2)
+    about = "element face 1\nproperty list uchar int64 vertex_indices\n"
+    vertex = f"element vertex 1\n{XYZ}"
+    for elements, body in ((about + vertex, face + bytes(12)), (vertex + about, bytes(12) + face)):
+        data = f"ply\nformat binary_little_endian 1.0\n{elements}end_header\n".encode() + body
+        assert read(data).points.tolist() == [[0, 0, 0]]
+    data = f"ply\nformat ascii 1.0\n{vertex}property list uchar int64 near\nend_header\n1 2 3 1 7\n"
+    with pytest.raises(InputError, match="the list property 'near' is made of int64; leave it out"):
+        read(data.encode())
+
+
+def test_text_may_have_decimal_commas_and_the_nan_of_windows(read):
+    data = f"ply\nformat ascii 1.0\nelement vertex 3\n{XYZ}end_header\n1,5 2,5 3\n-nan(ind) 1.#QNAN 2\n1 2 3\n"
+    assert read(data.encode()).points.tolist() == [[1.5, 2.5, 3], [1, 2, 3]]
+    with pytest.raises(InputError, match="some numbers have a decimal comma, others a point"):
+        read(data.replace("1 2 3", "1.0 2 3").encode())
+
+
+def test_thousands_of_properties_are_refused_at_once(read):
+    names = "".join(f"property uchar a{place}\n" for place in range(5000))
+    data = f"ply\nformat ascii 1.0\nelement vertex 1\n{XYZ}{names}end_header\n"
+    with pytest.raises(InputError, match="expected at most 4096 properties, found 5003"):
+        read(data.encode())

@@ -69,8 +69,10 @@ def bad_clouds(pipes):
         "one row of zeros among map coordinates": (np.vstack([pipes + MAP, np.zeros((1, 3))]), {"strays"}),
         "a tenth of zeros among map coordinates": (
             np.vstack([pipes + MAP, np.zeros((len(pipes) // 10, 3))]),
-            {"strays"},
+            {"strays", "zeros"},
         ),
+        "zeros where nothing was measured": (np.vstack([pipes, np.zeros((10, 3))]), {"zeros"}),
+        "a twentieth twice": (np.vstack([pipes, pipes[: len(pipes) // 20 + 1000]]), {"copies"}),
         "a wall": (WALL, {"flat"}),
         "degrees": (pipes / [111320, 80000, 1] + [11.5, 48.1, 500], {"degrees"}),
     }
@@ -103,7 +105,7 @@ def test_nothing_is_said_of_the_samples(name):
         steps(PIPES, 1e-3),
         (PIPES + 1e4).astype(np.float32),
         steps(PIPES, 1e-6) + MAP,
-        np.vstack([PIPES, PIPES[:5000]]),
+        np.vstack([PIPES, PIPES[:900]]),
         np.vstack([PIPES, 3 * random(50, 3)]),
         np.vstack([WALL, PIPES[:500]]),
         np.vstack([PIPES, np.full((40000, 3), np.nan)]),

@@ -15,11 +15,12 @@ import click
 from cylx.cli.batch.found import found_line
 from cylx.cli.batch.memory import cores, memory_needed
 from cylx.cli.batch.outcomes import Finished, Outcome, check_required, entry_of, failed_outcome, lost_outcome
-from cylx.cli.batch.resume import check_own, finished_before, is_own_json
+from cylx.cli.batch.resume import check_own, finished_before, is_own_json, written_by
 from cylx.cli.batch.run import attempt
 from cylx.cli.batch.summary import LIST, is_own_table, list_text, table_text
 from cylx.cli.terminal.display import Messages, show_table
 from cylx.cli.terminal.failures import DEBUG, tell
+from cylx.cli.terminal.signals import check_heard
 from cylx.cli.terminal.stopwatch import peak_memory
 from cylx.errors import BatchError, NothingFoundError, OutputError
 
@@ -89,6 +90,7 @@ class Batch:
         started = perf_counter()
         with self.run.messages.counting(len(self.jobs)) as advance:
             for index, outcome in self._outcomes():
+                check_heard()
                 self.outcomes[index] = outcome
                 self._show(self.jobs[index], outcome)
                 advance()
@@ -183,7 +185,7 @@ class Batch:
         from cylx.io import printable
 
         if outcome.trace:
-            tell(outcome.trace)
+            tell(outcome.trace, lines=True)
         if outcome.status == "failed":
             tell(f"cylx: {outcome.reason}")
         if outcome.finished is None or (len(self.jobs) >= SHORT and not self.run.messages.verbose):
@@ -194,6 +196,8 @@ class Batch:
             self.run.messages.say(found_line(job, outcome.finished.cylinders, outcome.finished.blends))
             for warning in outcome.finished.warnings:
                 self.run.messages.say(f"warning: {printable(job.scan)}: {warning}")
+            for note in outcome.finished.notes:
+                self.run.messages.say(f"note: {printable(job.scan)}: {note}")
 
     def _show_counts(self, failed: int, seconds: float) -> None:
         if self.run.messages.quiet:
@@ -206,13 +210,13 @@ class Batch:
 
     def _sum_up(self) -> None:
         """Write the table of all cylinders and the list of all scans."""
-        from cylx.io import read_json, write_text
+        from cylx.io import write_text
 
         if not self.summaries:
             return
         table, listed = self.summaries
         there = [(job, self.outcomes[index]) for index, job in enumerate(self.jobs)]
-        results = [(job.scan, read_json(job.result)) for job, outcome in there if outcome.finished is not None]
+        results = [(job.scan, written) for job, outcome in there if outcome.finished and (written := written_by(job))]
         write_text(table, table_text(results), overwrite=True)
         write_text(listed, list_text([entry_of(job, outcome) for job, outcome in there]), overwrite=True)
 

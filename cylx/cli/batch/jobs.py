@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cylx.errors import OutputError, UsageError
-from cylx.io.outputs import STREAM, moved_at_the_end
+from cylx.io.outputs import STANDARD_OUTPUT, STREAM, all_or_none
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, PointCloud
+    from cylx.records import Extraction
     from cylx.results import Result
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
@@ -97,7 +96,7 @@ def plan_jobs(
         If two outputs, or an output and an input, are the same file, or an output has no name.
     """
     names = (output, annotated, rejected, report, picture)
-    output, annotated, rejected, report, picture = (STREAM if name == "/dev/stdout" else name for name in names)
+    output, annotated, rejected, report, picture = (STREAM if name in STANDARD_OUTPUT else name for name in names)
     if len(scans) > 1:
         folders = {"--rejected": rejected, "--report": report, "--png": picture, "--mesh": mesh}
         _check_batch(scans, output, annotated, folders)
@@ -156,20 +155,6 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
         check_writable(name, overwrite=overwrite)
 
 
-def check_format(job: Job, cloud: PointCloud) -> None:
-    """Refuse a format of the annotated cloud that cannot hold the scan, before anything is computed.
-
-    Raises
-    ------
-    OutputError
-        If the format cannot hold it.
-    """
-    from cylx.io import check_annotated
-
-    if job.annotated is not None:
-        check_annotated(job.annotated, cloud)
-
-
 def _mesh(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
     """Make the requested mesh, with remarks for its reader."""
     if job.mesh is None:
@@ -198,12 +183,7 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
     content = Result.of(extraction)
     page, picture = _looks(job, extraction)
     mesh, remarks = _mesh(job, content)
-    with contextlib.ExitStack() as stack:
-
-        def staged(name: str) -> str | Path:
-            """Return the temporary name to write an output to."""
-            return stack.enter_context(moved_at_the_end(name, overwrite=overwrite))
-
+    with all_or_none(overwrite=overwrite) as staged:
         result = staged(job.result)  # renamed last: if the result exists, the other outputs do too
         if job.annotated is not None:
             write_annotated(staged(job.annotated), extraction, overwrite=overwrite)

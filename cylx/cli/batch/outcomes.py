@@ -31,6 +31,8 @@ class Finished:
         The times of the stages.
     blends : int
         Their number; 0 if they were not looked for.
+    notes : sequence of str
+        How the scan was read, and how its annotated cloud was written, if that needs a word.
     """
 
     points: int
@@ -38,6 +40,7 @@ class Finished:
     warnings: Sequence[str]
     profile: dict[str, object] | None = None
     blends: int = 0
+    notes: Sequence[str] = ()
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cylx.cli.batch.jobs import Job, check_format, write_job
+from cylx.cli.batch.annotated import check_format
+from cylx.cli.batch.jobs import Job, write_job
 from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_outcome
+from cylx.cli.terminal.failures import blamed_on
+from cylx.cli.terminal.signals import Listener, check_heard
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
 
 if TYPE_CHECKING:
@@ -58,19 +61,22 @@ class Run:
 
         collect_rarely()
         import_numba_without_blas()
-        from cylx.api.warmup import compile_kernels
+        from cylx.api.warmup import ask_between_kernels, compile_kernels
         from cylx.io import read_cloud
+        from cylx.io.inputs import check_unchanged, stamp_of
         from cylx.pipeline import extract_cylinders
         from cylx.scene import select
 
-        stopwatch = Stopwatch(job.scan)
+        ask_between_kernels(check_heard)
+        stopwatch, stamp = Stopwatch(job.scan), stamp_of(job.scan)
         with self.messages.progress() as display:
-            observer = Observers(display, stopwatch)
+            observer = Observers(Listener(), display, stopwatch)
             with observed(observer, "reading"):
                 cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
-            check_format(job, cloud)
+            job, notes = check_format(job, cloud, overwrite=self.overwrite)
             compile_kernels(observer)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
+            check_unchanged(job.scan, stamp, cloud.source.sha256)
             with observed(observer, "writing"):
                 remarks = write_job(job, extraction, overwrite=self.overwrite)
         found = len(extraction.cylinders)
@@ -78,14 +84,18 @@ class Run:
         report(self.messages, job, extraction)
         for remark in remarks:
             self.messages.say(f"warning: {remark}")
-        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()))
+        notes = [*cloud.source.notes, *notes]
+        for note in notes:
+            self.messages.say(f"note: {note}")
+        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()), notes)
 
 
 def attempt(run: Run, debug: bool, job: Job) -> Outcome:
     """Process a scan and return the outcome; a failure does not stop the other scans."""
     finished = None
     try:
-        finished = run.extract_one(job)
+        with blamed_on(job.scan):
+            finished = run.extract_one(job)
         check_required(job, finished.cylinders, run.require)
     except Exception as failure:  # noqa: BLE001  reported with exit code and traceback; a bug is reported as a bug
         return failed_outcome(failure, finished, debug=debug)

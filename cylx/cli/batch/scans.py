@@ -93,7 +93,8 @@ def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
     for place, folders, files in os.walk(folder, onerror=refuse):
         folders[:] = sorted(name for name in folders if recursive and not name.startswith("."))
         shown = sorted(name for name in files if not name.startswith("."))
-        yield from (str(Path(place, name)) for name in shown)
+        paths = (Path(place, name) for name in shown)
+        yield from (str(path) for path in paths if path.is_file())  # no pipe, and no link to a device
 
 
 def _is_foreign(path: str) -> bool:

@@ -12,6 +12,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from cylx.harmless import cell
+
 TABLE, LIST = "summary.csv", "summary.json"
 SCHEMA = "cylx.summary/1"
 
@@ -32,7 +34,8 @@ _PLAIN = re.compile(r"[A-Za-z0-9_./\\:+-][A-Za-z0-9_./\\: +-]*")
 def table_text(results: Sequence[tuple[str, Mapping[str, Any]]]) -> str:
     r"""Format the table: a header line, and one line per cylinder.
 
-    Lines end in LF. Texts are quoted, with quotes doubled, if they hold anything but letters, digits and `_./\:+-`.
+    Lines end in LF. Texts are quoted, with quotes doubled, if they hold anything but letters, digits and `_./\:+-`. A
+    text that a spreadsheet would run begins with an apostrophe.
     Values that a cylinder does not have are empty.
 
     Parameters
@@ -83,5 +86,5 @@ def _lines(file: str, result: Mapping[str, Any]) -> Iterator[str]:
 def _cell(value: object) -> str:
     if value is None:
         return ""
-    text = value if isinstance(value, str) else repr(value)
+    text = cell(value) if isinstance(value, str) else repr(value)
     return text if _PLAIN.fullmatch(text) else '"' + text.replace('"', '""') + '"'

@@ -6,6 +6,7 @@ themselves.
 
 from __future__ import annotations
 
+import errno
 import multiprocessing
 import os
 import signal
@@ -14,19 +15,21 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
-from types import FrameType
-from typing import Generic, NamedTuple, NoReturn, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from cylx.cli.batch.memory import free_memory, memory_held
+from cylx.cli.terminal.signals import listen
+from cylx.errors import UsageError
 
 Task = TypeVar("Task")
 Answer = TypeVar("Answer")
 
 _GLANCE = 1.0
 """Seconds between two checks of the memory."""
+_SCARCE = {errno.EMFILE, errno.ENFILE, errno.EAGAIN, errno.ENOMEM}
+"""What the system answers if there are too many files or processes."""
 _GRACE = 10.0
 """Seconds that a process has to end by itself."""
-_TERMINATED = 128 + 15
 
 
 class Lost(NamedTuple):
@@ -81,8 +84,9 @@ class Workers(Generic[Task, Answer]):
         try:
             while waiting or self._busy:
                 while waiting and len(self._busy) < self.most and self._fits(waiting[0], needs):
-                    index = waiting.popleft()
-                    self._busy[index] = self._give(tasks[index])
+                    if not self._start(waiting[0], tasks):
+                        break
+                    waiting.popleft()
                 ready = wait([worker.pipe for worker in self._busy.values()], _GLANCE)
                 for index in [index for index, worker in self._busy.items() if worker.pipe in ready]:
                     yield index, self._take(index)
@@ -96,6 +100,27 @@ class Workers(Generic[Task, Answer]):
             return True
         ours = sum(memory_held(worker.pid) for worker in (*self._busy.values(), *self._idle))
         return sum(needs[busy] for busy in self._busy) + needs[index] <= available + ours
+
+    def _start(self, index: int, tasks: Sequence[Task]) -> bool:
+        """Start a task; if the system allows no further process, go on with those that there are.
+
+        Raises
+        ------
+        UsageError
+            If there is none.
+        """
+        try:
+            self._busy[index] = self._give(tasks[index])
+        except OSError as error:
+            if error.errno not in _SCARCE:
+                raise
+            if not self._busy:
+                fault = f"no process can be started: {os.strerror(error.errno).lower()}"
+                remedy = "raise the limit (ulimit -a shows it), or leave --jobs out"
+                raise UsageError("--jobs", fault, remedy) from error
+            self.most = len(self._busy)
+            return False
+        return True
 
     def _give(self, task: Task) -> _Worker:
         """Send a task to an idle process, or to a new one."""
@@ -148,9 +173,14 @@ class _Worker:
         context = multiprocessing.get_context("spawn")
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
-        with _ctrl_c_kept_back():
-            self.process.start()
-        theirs.close()  # so that the pipe closes when the process ends
+        try:
+            with _ctrl_c_kept_back():
+                self.process.start()
+        except OSError:
+            self.pipe.close()
+            raise
+        finally:
+            theirs.close()  # so that the pipe closes when the process ends
         self.pid = self.process.pid or 0
 
 
@@ -172,8 +202,7 @@ def _ctrl_c_kept_back() -> Iterator[None]:
 
 def _serve(pipe: Connection, work: Callable[[Task], Answer]) -> None:
     """Run the tasks that come through the pipe until it is closed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, _leave)
+    listen(worker=True)
     threading.Thread(target=_follow_parent, daemon=True).start()
     while True:
         try:
@@ -183,11 +212,6 @@ def _serve(pipe: Connection, work: Callable[[Task], Answer]) -> None:
         answer = work(task)
         with suppress(OSError):
             pipe.send(answer)
-
-
-def _leave(_signal: int, _frame: FrameType | None) -> NoReturn:
-    """Exit in a way that removes temporary files."""
-    raise SystemExit(_TERMINATED)
 
 
 def _follow_parent() -> None:

@@ -228,7 +228,9 @@ def with_messages(command: Command) -> Command:
     @functools.wraps(command)
     def with_talk(*args: object, quiet: bool, verbose: bool, **others: object) -> object:
         from cylx.cli.terminal.display import Messages
+        from cylx.cli.terminal.streams import keep_libraries_apart
 
+        keep_libraries_apart(quiet=quiet)
         return command(*args, messages=Messages(quiet=quiet, verbose=verbose and not quiet), **others)
 
     verbose = click.option("-v", "--verbose", is_flag=True, help="Show what each stage kept and rejected, and why.")

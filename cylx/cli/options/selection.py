@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import re
 from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from cylx.cli.options.configuration import Command
+from cylx.cli.options.numbers import NumberRange
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
     ClassesType = click.ParamType[tuple[int, ...]]
 else:
     BoxType = ClassesType = click.ParamType  # not generic in older versions
+
+
+_CLASS = re.compile(r"[0-9]{1,9}")
 
 
 class CropBox(BoxType):
@@ -66,7 +71,7 @@ class Classes(ClassesType):
         if isinstance(value, tuple):
             return value
         parts = str(value).split(",")
-        if not all(part.strip().isascii() and part.strip().isdecimal() for part in parts):
+        if not all(_CLASS.fullmatch(part.strip()) for part in parts):
             self.fail(f"'{value}' is not a list of class numbers such as 2,6", param, ctx)
         return tuple(int(part) for part in parts)
 
@@ -102,7 +107,7 @@ _SELECTION: tuple[Callable[[Any], Any], ...] = (
     ),
     click.option(
         "--voxel",
-        type=click.FloatRange(0, float("inf"), min_open=True, max_open=True),
+        type=NumberRange(0, float("inf"), min_open=True, max_open=True),
         metavar="SIZE",
         help="Use only one point in each cell of this side length: the one nearest to the middle.",
     ),

@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from cylx.cli.terminal.failures import answer, tell
+from cylx.harmless import visible
 from cylx.records import Observer, SilentObserver
 
 if TYPE_CHECKING:
@@ -154,15 +155,15 @@ def show_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, err: boo
         numeric = bool(rows) and all(row[i][:1] in "+-.0123456789" for row in rows)
         table.add_column(Text(name), justify="right" if numeric else "left", no_wrap=numeric)
     for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
+        table.add_row(*(Text(visible(cell)) for cell in row))
     console = _console(sys.stderr if err else sys.stdout)
     with console.capture() as capture:
         console.print(table)
     text = "\n".join(filter(None, (line.rstrip() for line in capture.get().splitlines())))
     if err:
-        tell(text)
+        tell(text, styled=True)
     else:
-        answer(text + "\n")
+        answer(text + "\n", styled=True)
 
 
 def _console(stream: object) -> Console:

@@ -9,16 +9,58 @@ import sys
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from pathlib import Path
 from types import TracebackType
 
 import click
 
+from cylx.cli.terminal.signals import Ended, heard
 from cylx.errors import CylxError, InputError, OutputError
+from cylx.harmless import visible
 
 DEBUG = "cylx.debug"  # key in the context's meta
 BUG, USAGE, UNUSABLE, INTERRUPTED, READER_GONE = 1, 2, 3, 130, 141
 
+_LONGEST = 400
+_MOST_NAMES = 3
 _PASSED_ON = (click.exceptions.Exit, SystemExit, GeneratorExit)
+
+
+class UnforeseenError(Exception):
+    """A failure that no error of ours describes, with the file that it is about.
+
+    Parameters
+    ----------
+    place : str
+        The file, or several.
+    failure : Exception
+        What went wrong.
+    """
+
+    def __init__(self, place: str, failure: Exception) -> None:
+        super().__init__(place, failure)
+        self.place = place
+        self.failure = failure
+
+
+@contextmanager
+def blamed_on(*files: str) -> Iterator[None]:
+    """Name the files in the line about a failure that no error of ours describes.
+
+    Raises
+    ------
+    UnforeseenError
+        In place of such a failure.
+    """
+    try:
+        yield
+    except (CylxError, click.ClickException, click.Abort, click.exceptions.Exit, BrokenPipeError, UnforeseenError):
+        raise
+    except Exception as failure:
+        names = [_one_line(str(file)) for file in files[:_MOST_NAMES]] + ["…"] * (len(files) > _MOST_NAMES)
+        if not names:
+            raise
+        raise UnforeseenError(", ".join(names), failure) from failure
 
 
 class Failures:
@@ -41,13 +83,15 @@ class Failures:
     ) -> None:
         unwritten = flush_answer()
         if failure is None or isinstance(failure, _PASSED_ON):
-            failure = unwritten
+            failure = failure if isinstance(failure, Ended) else heard() or unwritten
+            if isinstance(failure, Ended):
+                raise failure
         elif isinstance(failure, OSError) and _raised_by_click(trace):
             failure = failure if isinstance(failure, BrokenPipeError) else _unwritten(failure)
         if failure is None:
             return
         if self.context is not None and self.context.meta.get(DEBUG):
-            tell("".join(traceback.format_exception(failure)).rstrip())
+            tell("".join(traceback.format_exception(failure)).rstrip(), lines=True)
         line, code = describe_failure(failure)
         if line:
             tell(line)
@@ -69,6 +113,9 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     code : int
         The exit code.
     """
+    place = ""
+    if isinstance(failure, UnforeseenError):
+        place, failure = failure.place, failure.failure
     if isinstance(failure, CylxError):
         return _one_line(f"cylx: {failure}"), failure.exit_code
     if isinstance(failure, click.ClickException):
@@ -78,19 +125,43 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     if isinstance(failure, KeyboardInterrupt | click.Abort):
         return "cylx: interrupted", INTERRUPTED
     if isinstance(failure, MemoryError):
-        return "cylx: out of memory; thin the scan, or cut it into parts", UNUSABLE
+        return f"cylx: {place}{': ' if place else ''}out of memory; thin the scan, or cut it into parts", UNUSABLE
+    if isinstance(failure, FileNotFoundError) and failure.filename is None and _nowhere():
+        return "cylx: the working folder has been removed; change to another folder", UNUSABLE
     what = _one_line(f"{type(failure).__name__}: {failure}")
-    return f"cylx: this is a bug of cylx: {what}; run it again with --debug for the traceback to report", BUG
+    remedy = "run it again with --debug for the traceback to report" + (f"; the input was {place}" if place else "")
+    return f"cylx: this is a bug of cylx: {what}; {remedy}", BUG
 
 
-def tell(line: str) -> None:
-    """Print a line on standard error; ignore it if standard error is closed."""
-    with contextlib.suppress(OSError):
-        click.echo(line, err=True)
+def tell(text: str, *, lines: bool = False, styled: bool = False) -> None:
+    """Print a line on standard error; if nobody can read it, do without it and all that follow.
+
+    Parameters
+    ----------
+    text : str
+        Characters that do not print are escaped.
+    lines : bool
+        Whether it may have several lines.
+    styled : bool
+        Whether it has commands for the terminal, and nothing of others that is not escaped already.
+    """
+    try:
+        click.echo(text if styled else visible(text, keep="\n\t" if lines else ""), err=True)
+    except OSError:
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: PTH123, SIM115  open until the end
 
 
-def answer(text: str) -> None:
+def answer(text: str, *, as_json: bool = False, styled: bool = False) -> None:
     """Write the answer, or a part of it, to standard output.
+
+    Parameters
+    ----------
+    text : str
+        Lines; other characters that do not print are escaped.
+    as_json : bool
+        Whether it is JSON, which is UTF-8 whatever the encoding of the terminal.
+    styled : bool
+        Whether it has commands for the terminal, and nothing of others that is not escaped already.
 
     Raises
     ------
@@ -101,8 +172,13 @@ def answer(text: str) -> None:
     """
     if sys.stdout is None:
         raise OutputError("standard output", "is closed", "open it, or write to a file")
+    text = text if styled else visible(text, keep="\n\t")
     encoding = sys.stdout.encoding or "utf-8"
     try:
+        if as_json and (raw := getattr(sys.stdout, "buffer", None)) is not None:
+            sys.stdout.flush()
+            raw.write(text.encode("utf-8", "backslashreplace"))
+            return
         click.echo(text.encode(encoding, "backslashreplace").decode(encoding), nl=False)
     except BrokenPipeError:
         raise
@@ -141,6 +217,14 @@ def flush_answer() -> BrokenPipeError | OutputError | None:
     return None
 
 
+def _nowhere() -> bool:
+    """Return whether the working folder has been removed."""
+    try:
+        return not Path.cwd()
+    except FileNotFoundError:
+        return True
+
+
 def _raised_by_click(trace: TracebackType | None) -> bool:
     """Return whether click failed to write its help or version to standard output."""
     frames = [frame for frame, _ in traceback.walk_tb(trace)]
@@ -158,7 +242,10 @@ def _usage_line(failure: click.ClickException) -> str:
     if isinstance(failure, getattr(click.exceptions, "NoArgsIsHelpError", ())):
         return failure.format_message()
     see = f"; see '{context.command_path} --help'" if context is not None else ""
-    return _one_line(f"cylx: {failure.format_message().rstrip('.')}{see}")
+    message = failure.format_message().rstrip(".")
+    if len(message) > _LONGEST:  # it repeats what was given
+        message = f"{message[: _LONGEST // 2]} … {message[-_LONGEST // 2 :]}"
+    return _one_line(f"cylx: {message}{see}")
 
 
 def _one_line(text: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from cylx.cli.terminal.failures import Failures
+from cylx.cli.terminal.failures import Failures, blamed_on
 
 
 class ExampleCommand(click.Command):
@@ -32,6 +32,13 @@ class ExampleCommand(click.Command):
                 for line in self.examples:
                     formatter.write(f"{'':>{formatter.current_indent}}{line}\n")
         super().format_help_text(ctx, formatter)
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Run the command; a failure that it did not foresee names the files that it was given."""
+        given = [ctx.params.get(item.name or "") for item in self.params if isinstance(item, click.Argument)]
+        files = [name for one in given for name in (one if isinstance(one, tuple) else (one,)) if isinstance(name, str)]
+        with blamed_on(*files):
+            return super().invoke(ctx)
 
 
 class ExampleGroup(ExampleCommand, click.Group):

@@ -158,7 +158,7 @@ def test_hostile_names_survive_in_the_table(name):
     text = table_text([(name, {"cylinders": [cylinder]})])
     header, row = csv.reader(io.StringIO(text, newline=""))
     assert len(row) == len(header) == len(COLUMNS)
-    assert row[0] == name.replace("\udcff", "\\xff")
+    assert row[0] == name.replace("\udcff", "\\xff").replace("=1", "'=1")
     assert row[header.index("end_z")] == "1e-20"
     assert text.encode("utf-8").count(b"\n") == 2 + name.count("\n")
 

@@ -76,7 +76,7 @@ def test_all_files_are_written_or_none(run_cylx, scan, tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("cylx.io.write_bytes", fail)
-    assert run_cylx("extract", scan, "--mesh", tmp_path / "a.stl").exit_code == 1
+    assert run_cylx("extract", scan, "--mesh", tmp_path / "a.stl").exit_code == 4
     assert names(tmp_path) == ["scan.xyz"]
 
 

@@ -1,0 +1,101 @@
+"""The XML of an E57 file, checked before libE57 parses it.
+
+Its parser opens the files and addresses that the XML names, in a DOCTYPE or as the place of a schema, and expands
+entities without end. An E57 file needs none of them.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from typing import TYPE_CHECKING
+
+from cylx.errors import InputError
+
+if TYPE_CHECKING:
+    from cylx.io.inputs import Input
+
+_PAGE, _PAYLOAD = 1024, 1020  # bytes of a page, the last four of which are a checksum
+_HEADER = 48
+_ENCODING = re.compile(rb"\bencoding\s*=\s*[\"']([^\"']*)[\"']")
+_ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii", "iso-8859-1")  # a byte of ASCII means the same in each
+_APART = {b"<?": b"?>", b"<!--": b"-->", b"<![CDATA[": b"]]>"}
+_OPENING = re.compile(rb"<\?|<!--|<!\[CDATA\[")
+_DTD = re.compile(rb"<!\s*(?:DOCTYPE|ENTITY|ELEMENT|ATTLIST|NOTATION)", re.IGNORECASE)
+_SCHEMA = re.compile(rb"schemaLocation\s*=", re.IGNORECASE)
+_REMEDY = "get a complete copy of the file"
+_MISTRUST = "do not trust the file; export it again with other software"
+
+
+def check_xml(source: Input) -> None:
+    """Refuse XML that has a DOCTYPE or an entity, names a schema, or is written in bytes that could hide them.
+
+    Parameters
+    ----------
+    source : Input
+        An E57 file.
+
+    Raises
+    ------
+    InputError
+    """
+    xml = _xml(source).removeprefix(b"\xef\xbb\xbf")
+    if xml.lstrip(b" \t\r\n")[:1] != b"<" or not _is_text(xml, _encoding(xml)):
+        raise InputError(source.place, "broken E57: its XML is no text in UTF-8", _REMEDY)
+    markup = _without_comments(xml)
+    if markup.lstrip()[:2] == b"<!" or _DTD.search(markup):
+        raise InputError(source.place, "its XML has a DOCTYPE or an entity, which E57 does not use", _MISTRUST)
+    if _SCHEMA.search(markup):
+        raise InputError(source.place, "its XML names the place of a schema, which E57 does not use", _MISTRUST)
+
+
+def _xml(source: Input) -> bytes:
+    """Return the bytes of the XML: those of its pages without their checksums."""
+    head = source.head(_HEADER)
+    if len(head) < _HEADER:
+        raise InputError(source.place, "broken E57: the file ends within its header", _REMEDY)
+    start, length, page = struct.unpack_from("<3Q", head, 24)
+    if page != _PAGE:
+        raise InputError(source.place, f"broken E57: its pages have {page} bytes, not {_PAGE}", _REMEDY)
+    if not _HEADER <= start < source.size or not 0 < length <= source.size:
+        raise InputError(source.place, "broken E57: its XML is not within the file", _REMEDY)
+    first = start // _PAGE
+    skipped = min(start - first * _PAGE, _PAYLOAD)
+    source.file.seek(first * _PAGE)
+    pages = source.file.read(-(-(skipped + length) // _PAYLOAD) * _PAGE)
+    logical = b"".join(pages[place : place + _PAYLOAD] for place in range(0, len(pages), _PAGE))
+    return logical[skipped : skipped + length]
+
+
+def _encoding(xml: bytes) -> str:
+    """Return the encoding that the XML declares; an empty text if it may not be used, or cannot be told for certain."""
+    declaration = xml[: xml.find(b"?>")] if xml.lstrip(b" \t\r\n").startswith(b"<?xml") else b""
+    found = [name.strip().lower().decode("ascii", "replace") for name in _ENCODING.findall(declaration)]
+    if declaration.lower().count(b"encoding") != len(found) or any(name not in _ENCODINGS for name in found):
+        return ""
+    return found[0] if found else "utf-8"
+
+
+def _is_text(xml: bytes, encoding: str) -> bool:
+    try:
+        return bool(encoding) and "\0" not in xml.decode(encoding)
+    except UnicodeDecodeError:
+        return False
+
+
+def _without_comments(xml: bytes) -> bytes:
+    """Return the XML without its comments, instructions and CDATA.
+
+    They are found in the order of the text, as the parser does: one that begins within another is a part of it, and one
+    that does not end stays.
+    """
+    kept: list[bytes] = []
+    place = 0
+    while (found := _OPENING.search(xml, place)) is not None:
+        end = xml.find(_APART[found[0]], found.end())
+        if end < 0:
+            break
+        kept.append(xml[place : found.start()])
+        place = end + len(_APART[found[0]])
+    kept.append(xml[place:])
+    return b" ".join(kept)

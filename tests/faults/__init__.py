@@ -1,0 +1,1 @@
+"""Faults on purpose: failing disks, changed inputs, killed runs."""
