@@ -15,7 +15,7 @@ SIGMA = 0.001
 
 
 def cluster_of(radii, seed=0, scatter=0.03, sigma=SIGMA):
-    """Give a cluster of windows laid on a surface of these radii, and the cloud; candidates scatter more than points."""
+    """Give candidates of windows laid on a surface of these radii, and the cloud; they scatter more than points."""
     rng = np.random.default_rng(seed)
     count = len(radii)
     turn = rng.uniform(-np.pi, np.pi, count)

@@ -29,7 +29,7 @@ def world(*shapes, n=1500):
     return indexed, findings, frame
 
 
-def finding(shape, points, frame, payoff=0.8, error=0.001):
+def finding(shape, points, frame, payoff=0.8, error=0.001, coverage=4.0):
     middle = (shape.point - frame.origin) / frame.spacing
     model = np.concatenate([middle, shape.direction, [shape.radius / frame.spacing]])
     half = 0.5 * shape.height / frame.spacing
@@ -39,7 +39,7 @@ def finding(shape, points, frame, payoff=0.8, error=0.001):
         support=10,
         payoff=payoff,
         confidence=0.9,
-        coverage=2 * np.pi,
+        coverage=coverage,
         offset_error=error * model[6],
         tilt_error=error * model[6] / half,
     )
@@ -75,6 +75,13 @@ def test_three_pieces_become_one_in_any_order():
     indexed, findings, _ = world(pipe(0, 3), pipe(3, 6), pipe(6, 9))
     for order in ([0, 1, 2], [0, 2, 1], [2, 0, 1]):
         assert len(merge_pieces([findings[k] for k in order], indexed, accept(indexed))) == 1
+
+
+@pytest.mark.parametrize("gap", [0.5, 3.0])
+def test_pieces_that_are_seen_all_round_and_end_in_a_cut_stay_two(gap):
+    indexed, findings, _ = world(pipe(0, 4), pipe(4 + gap, 8 + gap))
+    findings = [replace(one, coverage=2 * np.pi) for one in findings]
+    assert len(merge_pieces(findings, indexed, accept(indexed))) == 2
 
 
 @pytest.mark.parametrize(
