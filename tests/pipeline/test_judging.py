@@ -16,7 +16,7 @@ SUPPORT, PAYOFF = 40, 0.9
 
 
 def trunk(length, bow=0.0, taper=0.0, count=12000, seed=0):
-    """Draw a trunk of unit radius about the z axis, off it by the bow at its middle, thinner by the taper at its end."""
+    """Draw a trunk of unit radius about the z axis, off it by the bow at its middle and thinner at its upper end."""
     rng = np.random.default_rng(seed)
     turn, z = 2 * np.pi * rng.random(count), length * (rng.random(count) - 0.5)
     radius = 1 - taper * (z / length) + SIGMA * rng.standard_normal(count)
