@@ -41,7 +41,7 @@ def findings_of(*pieces, turned=None, scale=1.0, flip=()):
         model = np.concatenate([middle, -up if k in flip else up, [scale / frame.spacing]])
         segment = Segment(model, scale * 0.5 * (high - low) / frame.spacing, scale * SIGMA / frame.spacing)
         turn = np.degrees(np.arctan2(one[:, 1], one[:, 0]))
-        coverage = np.radians(10.0 * len(np.unique(turn // 10.0)))
+        coverage = np.radians(30.0 * len(np.unique(turn // 30.0)))
         found.append(Finding(segment, np.flatnonzero(owner == k), 10, 0.8, 0.9, coverage, 0.01, 0.01))
     return indexed, found, scale / frame.spacing
 

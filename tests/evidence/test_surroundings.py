@@ -52,6 +52,17 @@ def test_caps_and_plates_at_the_ends_do_not_count(seed, half, plates, both):
     assert max(measured(wall(rng, half, 800), *ends, half=half)) < 0.03
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_plates_that_the_noise_spreads_over_much_of_a_disc_hardly_count(seed):
+    rng, half, sigma = np.random.default_rng(seed), 0.1, 0.025
+    plates = [cap(rng, sign * half, RADIUS, 1.5, 4000, sigma) for sign in (-1, 1)]
+    bare = wall(rng, half, 1600, sigma=sigma)
+    beside = measured(bare, *plates, half=half, deviation=sigma)[1]
+    # as many points all over the height count much more
+    spread = [(rng.uniform(-half, half, 4000), *one[1:]) for one in plates]
+    assert 3 * beside < measured(bare, *spread, half=half, deviation=sigma)[1]
+
+
 @pytest.mark.parametrize("half", [0.1, 0.5, 2.0])
 def test_what_fills_it_counts(half):
     rng = np.random.default_rng(1)

@@ -76,6 +76,14 @@ def test_a_rough_surface_stays_whole(seed, rough):
     assert split(*cluster_of(radii, seed)) is None
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_surface_that_is_rough_in_part_stays_whole(seed):
+    rng = np.random.default_rng(seed)
+    radii = rng.permutation(np.concatenate([np.full(54, 1.0), rng.uniform(1.01, 1.08, 66)]))
+    radii[:15] = 1.0
+    assert split(*cluster_of(radii, seed)) is None
+
+
 def test_a_few_windows_are_not_split():
     assert split(*cluster_of(mixed(3, 2, 0.05, 0))) is None
 
