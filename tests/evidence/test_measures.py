@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-from cylx.evidence.measures import Shell, deviations_of_form, own_scatter, scatter_of
-from cylx.records import Segment
+from cylx.config import Config
+from cylx.evidence.measures import Shell, deviations_of_form, edge_gain, look_at, own_scatter, scatter_of
+from cylx.geometry.cells import Cells
+from cylx.geometry.cylinder import coordinates_of
+from cylx.records import IndexedCloud, Noise, Segment
+from cylx.scene import make_frame
 
 RADIUS, HALF, SIGMA = 1.0, 2.0, 0.01
 SHAPES = {
@@ -86,3 +90,66 @@ def test_a_surface_may_be_rougher_than_the_noise_about_it_within_bounds():
         assert taken.max() < max(2.1 * noise, 0.1 * RADIUS)
         between = (spreads > noise) & (spreads < 2 * noise)
         assert taken[between] == pytest.approx(spreads[between])
+
+
+def wedge(turn_deg, way_deg=0.0):
+    """Give an arc about the z axis, of which so much is its own, and its middle that way."""
+    way, half = np.radians(way_deg), 0.5 * np.radians(turn_deg)
+    model = np.array([0.0, 0, 0, 0, 0, 1, RADIUS])
+    return Segment(model, HALF, SIGMA, wedge=np.array([np.cos(way), np.sin(way), 0.0, np.cos(half)]))
+
+
+def surface(turn, seed=0):
+    rng = np.random.default_rng(seed)
+    own = RADIUS + SIGMA * rng.standard_normal(len(turn))
+    return np.column_stack([own * np.cos(turn), own * np.sin(turn), rng.uniform(-HALF, HALF, len(turn))])
+
+
+@pytest.mark.parametrize(("turn_deg", "way_deg"), [(60, 0), (90, 130), (180, -90), (270, 10)])
+def test_what_lies_beyond_the_ends_of_an_arc_is_not_of_it(turn_deg, way_deg):
+    turn = np.random.default_rng(1).uniform(-np.pi, np.pi, 4000)
+    segment = wedge(turn_deg, way_deg)
+    shell = look_at(segment, world(surface(turn)))
+    away = np.abs((shell.angles - angle_of(segment) + np.pi) % (2 * np.pi) - np.pi)
+    inside = away < np.radians(turn_deg / 2)
+    assert (shell.flat == ~inside).all()
+    assert shell.on[inside].mean() > 0.99
+    assert not shell.on[~inside].any()
+    assert len(shell.on) == 4000
+
+
+def test_a_segment_that_is_no_arc_has_no_edge_to_gain_on():
+    turn = np.random.default_rng(1).uniform(-np.pi, np.pi, 2000)
+    plain = Segment(np.array([0.0, 0, 0, 0, 0, 1, RADIUS]), HALF, SIGMA)
+    assert edge_gain(look_at(plain, world(surface(turn))), plain, SIGMA) == 0.0
+
+
+@pytest.mark.parametrize("turn_deg", [60, 90, 150])
+def test_an_arc_gains_on_its_edge_and_an_edge_on_its_arc(turn_deg):
+    segment, half = wedge(turn_deg), 0.5 * np.radians(turn_deg)
+    turn = np.random.default_rng(2).uniform(-half, half, 1500)
+    points = surface(turn)
+    shell = look_at(segment, world(points))
+    gain = edge_gain(shell, segment, SIGMA)
+    assert gain > 1500
+    assert edge_gain(shell, segment, 100 * SIGMA) < gain  # what scatters more tells less
+    sharp = points.copy()
+    sharp[:, :2] *= (1.0 / np.cos(half - np.abs(turn)))[:, None]
+    assert edge_gain(look_at(segment, world(sharp)), segment, SIGMA) < 0
+
+
+def angle_of(segment):
+    """Give the angle of the middle of an arc, as the coordinates of its cylinder have it."""
+    _, _, angles = coordinates_of(segment.wedge[None, :3], np.array([0]), segment.model)
+    return float(angles[0])
+
+
+def world(points):
+    """Put points into cells as they are."""
+    frame, _ = make_frame(points, Config())
+    # the unit of the frame is undone: what is looked at has the lengths of the scene
+    return IndexedCloud(
+        Cells(frame.points * frame.spacing + frame.origin, frame.codes),
+        np.zeros(len(points)),
+        Noise(np.ones(1), np.array([SIGMA])),
+    )

@@ -94,6 +94,27 @@ def test_gaps_of_three_radii_are_bridged_and_wider_ones_are_not(seed, gap, goes_
     assert np.allclose(visible_extent(-heights, angles, 1.5, 1.0), mirrored, rtol=0, atol=0.15)
 
 
+@laws
+@given(seeds, st.floats(0.05, 0.3), st.floats(-5, 5))
+def test_a_disc_is_as_high_as_its_points(seed, height, power):
+    rng, scale = np.random.default_rng(seed), np.exp(power)
+    heights, angles = surface(rng, 1500, 2 * np.pi, -0.5 * height, 0.5 * height)
+    ends = visible_extent(scale * heights, angles, 0.5 * scale * height, scale)
+    assert np.allclose(ends, (-0.5 * scale * height, 0.5 * scale * height), rtol=0, atol=0.05 * scale * height)
+
+
+@laws
+@given(seeds, st.floats(0.05, 0.3), st.floats(1.0, 2.5))
+def test_two_discs_on_one_axis_are_not_bridged(seed, height, gap):
+    rng = np.random.default_rng(seed)
+    one = surface(rng, 1500, 2 * np.pi, -0.5 * height, 0.5 * height)
+    other = surface(rng, 1500, 2 * np.pi, 0.5 * height + gap, 1.5 * height + gap)
+    heights, angles = (np.concatenate(both) for both in zip(one, other, strict=True))
+    for sign in (-1.0, 1.0):
+        ends = visible_extent(sign * heights, angles, 0.5 * height, 1.0)
+        assert np.allclose(ends, (-0.5 * height, 0.5 * height), rtol=0, atol=0.05 * height)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_what_goes_on_at_one_side_of_the_arc_alone_is_something_else(seed):
     rng = np.random.default_rng(seed)

@@ -232,3 +232,23 @@ def test_a_few_points_have_no_extent():
     assert visible_extent(heights, angles, 1.0, 1.0) is None
     assert visible_extent(np.empty(0), np.empty(0), 1.0, 1.0) is None
     assert visible_extent(heights + 100, angles, 1.0, 1.0) is None
+
+
+def wall(rng, radius, low, high, density=300.0):
+    """Draw a wall about the z axis that has no noise."""
+    turn = 2 * np.pi * rng.random(round(density * radius * (high - low)))
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), rng.uniform(low, high, len(turn))])
+
+
+@pytest.mark.parametrize("other", [1.08, 1.03, 0.92])
+@pytest.mark.parametrize(("low", "high"), [(-2.0, 2.0), (2.0, 4.0)], ids=["about it", "beyond its end"])
+def test_another_wall_does_not_draw_a_fit_without_noise(other, low, high):
+    rng = np.random.default_rng(0)
+    indexed, frame = ground_of(np.concatenate([wall(rng, 1.0, -2, 2), wall(rng, other, low, high)]), 1e-5)
+    start = np.concatenate([-frame.origin, [0, 0, frame.spacing], [1.0]]) / frame.spacing
+    truth = start.copy()
+    start[:2] += 5e-4 / frame.spacing
+    start[6] *= 1 + 5e-4
+    found = refine(Segment(start, 1.0 / frame.spacing, 0.0), indexed)
+    assert_true(found, truth, 1e-4)
+    assert found.half * frame.spacing == pytest.approx(2.0, abs=0.1)

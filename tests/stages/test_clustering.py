@@ -182,3 +182,30 @@ def test_thinning_leaves_different_candidates_alone():
     assert len(thin_candidates(candidates)) == 200
     assert np.array_equal(thin_candidates(candidates).models, candidates.models)
     assert len(thin_candidates(make(np.empty((0, 7))))) == 0
+
+
+def test_those_restored_come_again_but_once():
+    candidates, owner = crowd(5)
+    game = CandidateGame(candidates, ClusteringConfig())
+    first = game.next_cluster()
+    game.restore(first.members)
+    again = game.next_cluster()
+    assert sorted(again.members) == sorted(first.members)
+    assert again.weights[np.argsort(again.members)] == pytest.approx(first.weights[np.argsort(first.members)])
+    game.restore(first.members)  # once is enough
+    rest = []
+    while (cluster := game.next_cluster()) is not None:
+        rest.append(cluster)
+    assert not np.isin(np.concatenate([each.members for each in rest]), first.members).any()
+    assert {owner[each.members[0]] for each in rest} == {0, 1, 2} - {owner[first.members[0]]}
+
+
+def test_restoring_those_who_never_left_changes_nothing():
+    candidates, _ = crowd(6)
+    one, other = (CandidateGame(candidates, ClusteringConfig()) for _ in range(2))
+    other.restore(np.arange(len(candidates)))
+    while (cluster := one.next_cluster()) is not None:
+        same = other.next_cluster()
+        assert np.array_equal(cluster.members, same.members)
+        assert np.array_equal(cluster.weights, same.weights)
+    assert other.next_cluster() is None

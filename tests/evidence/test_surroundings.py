@@ -1,0 +1,122 @@
+"""What lies inside and just outside of a surface: caps and other walls are forgiven, clutter is not."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cylx.evidence.measures import Shell
+from cylx.evidence.surroundings import emptiness
+
+RADIUS = 1.0
+laws = settings(max_examples=25, deadline=None)
+seeds = st.integers(0, 2**32 - 1)
+
+
+def wall(rng, half, count, radius=RADIUS, sigma=0.004, turn_deg=360.0):
+    """Draw heights, distances and angles of points on a wall."""
+    distances = radius + sigma * rng.standard_normal(count)
+    return rng.uniform(-half, half, count), distances, np.radians(turn_deg) * (rng.random(count) - 0.5)
+
+
+def cap(rng, height, inner, outer, count, sigma=0.004):
+    """Draw from a ring across the axis."""
+    distances = np.sqrt(rng.uniform(inner**2, outer**2, count))
+    return height + sigma * rng.standard_normal(count), distances, rng.uniform(-np.pi, np.pi, count)
+
+
+def measured(*parts, half, deviation=0.004, flat=False):
+    """Give the points inside and outside, as shares; `flat` says which part is of planes."""
+    heights, distances, angles = (np.concatenate(column) for column in zip(*parts, strict=True))
+    kept = np.abs(heights) <= half
+    of_planes = np.concatenate([np.full(len(part[0]), flat and k > 0) for k, part in enumerate(parts)])[kept]
+    residuals = distances[kept] - RADIUS
+    on = (np.abs(residuals) < 3 * deviation) & ~of_planes
+    shell = Shell(np.arange(kept.sum()), heights[kept] / half, residuals, angles[kept], on, of_planes, deviation)
+    return emptiness(shell, RADIUS, half)
+
+
+@laws
+@given(seeds, st.floats(0.05, 3.0))
+def test_a_bare_wall_is_empty(seed, half):
+    rng = np.random.default_rng(seed)
+    assert measured(wall(rng, half, 2000), half=half) == (0.0, 0.0)
+
+
+@laws
+@given(seeds, st.floats(0.05, 0.5), st.booleans(), st.booleans())
+def test_caps_and_plates_at_the_ends_do_not_count(seed, half, plates, both):
+    rng = np.random.default_rng(seed)
+    limits = (RADIUS, 2.5) if plates else (0.0, RADIUS)
+    ends = [cap(rng, sign * half, *limits, 4000) for sign in ((-1, 1) if both else (1,))]
+    assert max(measured(wall(rng, half, 800), *ends, half=half)) < 0.03
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_plates_that_the_noise_spreads_over_much_of_a_disc_hardly_count(seed):
+    rng, half, sigma = np.random.default_rng(seed), 0.1, 0.025
+    plates = [cap(rng, sign * half, RADIUS, 1.5, 4000, sigma) for sign in (-1, 1)]
+    bare = wall(rng, half, 1600, sigma=sigma)
+    beside = measured(bare, *plates, half=half, deviation=sigma)[1]
+    # as many points all over the height count much more
+    spread = [(rng.uniform(-half, half, 4000), *one[1:]) for one in plates]
+    assert 3 * beside < measured(bare, *spread, half=half, deviation=sigma)[1]
+
+
+@pytest.mark.parametrize("half", [0.1, 0.5, 2.0])
+def test_what_fills_it_counts(half):
+    rng = np.random.default_rng(1)
+    filled = rng.uniform(-half, half, 4000), np.sqrt(rng.random(4000)), rng.uniform(-np.pi, np.pi, 4000)
+    inside, outside = measured(wall(rng, half, 800), filled, half=half)
+    assert inside > 0.3
+    assert outside < 0.05
+
+
+@pytest.mark.parametrize("radius", [1.1, 1.25, 1.45])
+@pytest.mark.parametrize("half", [1.0, 3.0])
+def test_an_outer_wall_does_not_count(radius, half):
+    rng = np.random.default_rng(2)
+    assert measured(wall(rng, half, 2000), wall(rng, half, 2000, radius), half=half) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("turn_deg", [60, 180])
+def test_a_piece_of_a_wall_is_no_outer_wall(turn_deg):
+    rng = np.random.default_rng(3)
+    _, outside = measured(wall(rng, 1.0, 2000), wall(rng, 1.0, 1000, 1.2, turn_deg=turn_deg), half=1.0)
+    assert outside > 0.3
+
+
+def test_clutter_about_a_rough_thing_counts_though_much_of_it_is_as_far_off():
+    rng = np.random.default_rng(4)
+    rough, sigma = wall(rng, 2.0, 2000, sigma=0.05), 0.05
+    clutter = wall(rng, 2.0, 2000, 1.3, sigma=0.05)
+    assert measured(rough, half=2.0, deviation=sigma)[1] < 0.05
+    assert measured(rough, clutter, half=2.0, deviation=sigma)[1] > 0.5
+    # the same about a smooth one would be a wall
+    assert measured(wall(rng, 2.0, 2000), wall(rng, 2.0, 2000, 1.3), half=2.0)[1] == 0.0
+
+
+def test_points_of_planes_outside_do_not_count():
+    rng = np.random.default_rng(5)
+    beside = rng.uniform(-2, 2, 3000), rng.uniform(1.05, 1.4, 3000), rng.uniform(-0.5, 0.5, 3000)
+    assert measured(wall(rng, 2.0, 2000), beside, half=2.0)[1] > 0.5
+    assert measured(wall(rng, 2.0, 2000), beside, half=2.0, flat=True)[1] == 0.0
+
+
+def test_without_points_on_it_a_surface_is_not_empty():
+    rng = np.random.default_rng(6)
+    assert measured(wall(rng, 1.0, 100, radius=2.0), half=1.0) == (1.0, 1.0)
+
+
+@pytest.mark.parametrize("scale", [1e-6, 1e6])
+def test_the_unit_is_no_matter(scale):
+    rng = np.random.default_rng(7)
+    heights, distances, angles = (
+        np.concatenate(both) for both in zip(wall(rng, 1.0, 500), cap(rng, 0.1, 0, 1, 500), strict=True)
+    )
+    none = np.zeros(len(heights), bool)
+    one, other = (
+        emptiness(Shell(np.arange(len(heights)), heights, k * (distances - 1), angles, ~none, none, 0.004 * k), k, k)
+        for k in (1.0, scale)
+    )
+    assert one == pytest.approx(other)
