@@ -94,7 +94,8 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
     on = np.abs(residuals) < 3.0 * noise + 2.0 * astray
     for sign in (-1.0, 1.0):
         if ends_in_cut(finding, indexed, sign > 0.0) and _is_behind_gap(sign * heights[on], half):
-            near, heights, residuals, on = (one[sign * heights <= half] for one in (near, heights, residuals, on))
+            kept = sign * heights <= half
+            near, heights, residuals, on = near[kept], heights[kept], residuals[kept], on[kept]
     fresh = (np.abs(heights) > half) & on
     astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
     if fresh.sum() < LEAST_POINTS_BEYOND_END:
