@@ -144,12 +144,12 @@ def test_a_usage_error_is_one_line(run_cylx, args, line):
     ("failure", "code", "line"),
     [
         (UsageError("-o", "is odd", "leave it out"), 2, "cylx: -o: is odd; leave it out"),
-        (ConfigError("my.yaml: a\nb", "unknown key", "c"), 2, "cylx: my.yaml: a b: unknown key; c"),
+        (ConfigError("my.yaml: a\nb", "unknown key", "c"), 2, "cylx: my.yaml: a\\nb: unknown key; c"),
         (InputError("s.ply", "is empty", "give points"), 3, "cylx: s.ply: is empty; give points"),
         (OutputError("s.json", "exists", "give --overwrite"), 4, "cylx: s.json: exists; give --overwrite"),
         (NothingFoundError("s.ply", "0 found", "look at it"), 5, "cylx: s.ply: 0 found; look at it"),
         (BatchError("1 of 2", "failed", "see above"), 6, "cylx: 1 of 2: failed; see above"),
-        (InputError("\x1b[31m\x07.ply", "is odd", "rename it"), 3, "cylx:  [31m .ply: is odd; rename it"),
+        (InputError("\x1b[31m\x07.ply", "is odd", "rename it"), 3, "cylx: \\x1b[31m\\x07.ply: is odd; rename it"),
         (KeyboardInterrupt(), 130, "cylx: interrupted"),
         (MemoryError(), 3, "cylx: out of memory; thin the scan, or cut it into parts"),
         (

@@ -95,7 +95,7 @@ def test_check_gives_programs_all_faults(run_cylx, tmp_path, text, places):
         ("slicing: {thicknes: 1}", ": slicing.thicknes: unknown key; did you mean 'thickness'?"),
         ("seed: 1\nseed: 2", ":2: the key 'seed' appears twice; leave one of them out"),
         ("seed: -1", ": seed: -1 is out of range; it must be >= 0"),
-        ('"a\\nb": 1', ": a b: unknown key; the keys here are preset, method, "),
+        ('"a\\nb": 1', ": a\\nb: unknown key; the keys here are preset, method, "),
     ],
 )
 def test_check_says_no_in_one_line(run_cylx, tmp_path, text, fault):

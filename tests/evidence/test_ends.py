@@ -24,16 +24,25 @@ def piece(low, high, turn_deg=360.0, lower=0.0, upper=0.0, step=STEP, seed=0):
     return np.column_stack([own * np.cos(turn), own * np.sin(turn), height])
 
 
-def findings_of(*pieces, turned=None, scale=1.0, flip=()):
-    """Give the cloud of pieces, and a finding of each."""
+def plate(height, seed):
+    """Draw what adjoins the mouth of a bore."""
+    rng = np.random.default_rng(100 + seed)
+    turn, distance = 2 * np.pi * rng.random(400), np.sqrt(rng.uniform(0.75**2, 1.3**2, 400))
+    return np.column_stack([distance * np.cos(turn), distance * np.sin(turn), np.full(400, height)])
+
+
+def findings_of(*pieces, turned=None, scale=1.0, flip=(), plates=True):
+    """Give the cloud of pieces and of plates at their ends, and a finding of each."""
     up = np.array([0.0, 0.0, 1.0])
-    points = scale * np.concatenate(pieces)
+    ends = [end for one in pieces for end in (one[:, 2].min(), one[:, 2].max())] if plates else []
+    points = scale * np.concatenate([*pieces, *[plate(end, k) for k, end in enumerate(ends)]])
     if turned is not None:
         points, up = points @ turned.T, turned @ up
     frame, _ = make_frame(points, Config())
     noise = Noise(np.ones(1), np.array([scale * SIGMA / frame.spacing]))
     indexed = IndexedCloud(Cells(frame.points, frame.codes), np.zeros(len(points)), noise)
-    owner = np.repeat(np.arange(len(pieces)), [len(one) for one in pieces])[frame.order]
+    owner = np.repeat(np.arange(len(pieces)), [len(one) for one in pieces])
+    owner = np.append(owner, np.full(len(points) - len(owner), -1))[frame.order]
     found = []
     for k, one in enumerate(pieces):
         low, high = one[:, 2].min(), one[:, 2].max()
@@ -77,6 +86,10 @@ def test_a_piece_that_is_broken_off_unevenly_is_not_cut():
     assert not distinct(piece(0, 3), piece(4, 7, lower=ragged(1.0), seed=1), gap=1.0)
     # the other ends are no matter
     assert distinct(piece(0, 3, lower=ragged(1.0)), piece(4, 7, upper=ragged(1.0), seed=1), gap=1.0)
+
+
+def test_a_piece_at_whose_end_nothing_adjoins_may_go_on():
+    assert not distinct(piece(0, 3), piece(4, 7, seed=1), gap=1.0, plates=False)
 
 
 def test_what_is_hidden_from_one_side_is_not_cut():
