@@ -23,13 +23,13 @@ LINE_LENGTH = 2.0
 """The lines are looked for so many radii long past where they touch the arc."""
 CLEAR = 0.35
 """A line is fitted to what is further than this, in radii, past where it touches the arc."""
-SIDE_STEPS = np.radians(np.arange(8.0, 116.0, 2.0))
+SIDE_STEPS = np.radians(np.arange(8.0, 116.0, 3.0))
 """Half angles of the arc that are tried."""
-OFFSETS = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
+OFFSETS = np.array([-1.5, 0.0, 1.5])
 """Distances of a line from the first circle that are tried, in deviations."""
 LEAST_TURN, PARALLEL = math.radians(20.0), math.radians(172.0)
 """Turns between the lines that have an arc, and from which the lines are parallel."""
-RADII = np.geomspace(0.35, 1.5, 40)
+RADII = np.geomspace(0.35, 1.5, 30)
 """Radii that are tried, as shares of that of the first circle."""
 CLIPPED = 3.0
 """Residuals count up to so many deviations."""

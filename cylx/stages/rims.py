@@ -221,3 +221,4 @@ def _find_circles(
             ):
                 rows[s, level, 0] += flat[i, 0]
                 rows[s, level, 1] += flat[i, 1]
+                break  # what is found from further away is the same, or something else
