@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.kernels import njit
 
 LEAST_ON_LINE = 12
 """Points of a line."""
@@ -93,7 +94,7 @@ def fit_profile(points: FloatArray, radius: float, middle: float, deviation: flo
         None if there are no two lines that touch.
     """
     turn = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]])
-    local = points @ turn.T  # the arc's middle is on the first axis
+    local = np.ascontiguousarray(points @ turn.T)  # the arc's middle is on the first axis
     upper, lower = _line_beside(local, radius, deviation, 1.0), _line_beside(local, radius, deviation, -1.0)
     if upper is None or lower is None:
         return None
@@ -122,20 +123,12 @@ def fit_profile(points: FloatArray, radius: float, middle: float, deviation: flo
 
 def _line_beside(local: FloatArray, radius: float, deviation: float, sign: float) -> _Line | None:
     """Return the line that touches the first circle on one side of its middle and has most points."""
-    x, y = local[:, 0], sign * local[:, 1]
-    best, most = None, LEAST_ON_LINE - 1
-    for angle in SIDE_STEPS:
-        normal = np.array([math.cos(angle), math.sin(angle)])
-        height = x * normal[0] + y * normal[1] - radius
-        along = y * normal[0] - x * normal[1]
-        beyond = (along > CLEAR * radius) & (along < LINE_LENGTH * radius)
-        for offset in OFFSETS:
-            count = int((beyond & (np.abs(height - offset * deviation) < NEAR_LINE * deviation)).sum())
-            if count > most:
-                best, most = (normal, radius + offset * deviation), count
-    if best is None:
+    x, y = np.ascontiguousarray(local[:, 0]), sign * local[:, 1]
+    place, offset = _most_on_line(x, y, np.cos(SIDE_STEPS), np.sin(SIDE_STEPS), OFFSETS * deviation, radius, deviation)
+    if place < 0:
         return None
-    normal, distance = best
+    normal = np.array([math.cos(SIDE_STEPS[place]), math.sin(SIDE_STEPS[place])])
+    distance = radius + float(OFFSETS[offset]) * deviation
     own = np.column_stack([x, y])
     for _ in range(FINER):
         along = own @ np.array([-normal[1], normal[0]])
@@ -150,17 +143,66 @@ def _line_beside(local: FloatArray, radius: float, deviation: float, sign: float
     return _Line(np.array([normal[0], sign * normal[1]]), distance)
 
 
+@njit(cache=True, nogil=True)
+def _most_on_line(
+    x: FloatArray,
+    y: FloatArray,
+    cosines: FloatArray,
+    sines: FloatArray,
+    offsets: FloatArray,
+    radius: float,
+    deviation: float,
+) -> tuple[int, int]:
+    """Return which of the touching lines, of an angle and an offset, has most points; negative if none has enough."""
+    place, shift, most = -1, -1, LEAST_ON_LINE - 1
+    counts = np.empty(len(offsets), np.int64)
+    for a in range(len(cosines)):
+        counts[:] = 0
+        for i in range(len(x)):
+            along = y[i] * cosines[a] - x[i] * sines[a]
+            if CLEAR * radius < along < LINE_LENGTH * radius:
+                height = x[i] * cosines[a] + y[i] * sines[a] - radius
+                for b in range(len(offsets)):
+                    if abs(height - offsets[b]) < NEAR_LINE * deviation:
+                        counts[b] += 1
+        for b in range(len(offsets)):
+            if counts[b] > most:
+                place, shift, most = a, b, counts[b]
+    return place, shift
+
+
 def _cost(local: FloatArray, center: FloatArray, radius: float, lines: tuple[_Line, _Line], deviation: float) -> float:
     """Return the sum of squared residuals about the profile, in squared deviations, clipped."""
-    away = local - center
-    residuals = np.hypot(away[:, 0], away[:, 1]) - radius
-    for line, other in (lines, lines[::-1]):
-        along = np.array([-line.normal[1], line.normal[0]])
-        along *= -math.copysign(1.0, float(along @ other.normal)) if abs(float(along @ other.normal)) > 1e-9 else 1.0
-        past = away @ along > 0.0
-        heights = local @ line.normal - line.offset
-        residuals = np.where(past & (np.abs(heights) < np.abs(residuals)), heights, residuals)
-    return float((np.minimum(np.abs(residuals) / deviation, CLIPPED) ** 2).sum())
+    (upper, upper_offset), (lower, lower_offset) = lines
+    return float(_sum_of_squares(local, center, radius, upper, upper_offset, lower, lower_offset, deviation))
+
+
+@njit(cache=True, nogil=True)
+def _sum_of_squares(
+    local: FloatArray,
+    center: FloatArray,
+    radius: float,
+    upper: FloatArray,
+    upper_offset: float,
+    lower: FloatArray,
+    lower_offset: float,
+    deviation: float,
+) -> float:
+    # along each line, away from the arc
+    turn = lower[1] * upper[0] - lower[0] * upper[1]
+    sign = -1.0 if turn > 1e-9 else 1.0
+    back = 1.0 if abs(turn) < 1e-9 else -sign
+    total = 0.0
+    for i in range(len(local)):
+        x, y = local[i, 0] - center[0], local[i, 1] - center[1]
+        residual = abs(math.sqrt(x * x + y * y) - radius)
+        if sign * (y * upper[0] - x * upper[1]) > 0.0:
+            residual = min(residual, abs(local[i, 0] * upper[0] + local[i, 1] * upper[1] - upper_offset))
+        if back * (y * lower[0] - x * lower[1]) > 0.0:
+            residual = min(residual, abs(local[i, 0] * lower[0] + local[i, 1] * lower[1] - lower_offset))
+        ratio = min(residual / deviation, CLIPPED)
+        total += ratio * ratio
+    return total
 
 
 def _grow(

@@ -8,7 +8,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.kernels import njit
-from cylx.geometry.numerics import REORDERED, solve_in_place
+from cylx.geometry.numerics import solve_in_place
 
 
 @njit(cache=True, nogil=True)
@@ -62,7 +62,7 @@ def search_circle(
     return record
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _support(xy: FloatArray, n: int, x: float, y: float, radius: float, tolerance: float) -> float:
     score = 0.0
     for i in range(n):

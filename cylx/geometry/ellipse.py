@@ -9,7 +9,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.kernels import njit
-from cylx.geometry.numerics import REORDERED, solve_in_place
+from cylx.geometry.numerics import solve_in_place
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,7 +256,7 @@ def search_conic(
     return record
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=REORDERED)
+@njit(cache=True, nogil=True, error_model="numpy")
 def _support(xy: FloatArray, n: int, conic: FloatArray, tolerance: float) -> float:
     """Return the sum of one minus the squared distance from a conic over the squared tolerance, to first order."""
     a, b, c, d, e = conic[0], conic[1], conic[2], conic[3], conic[4]

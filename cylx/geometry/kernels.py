@@ -20,7 +20,6 @@ from typing import Any, TypeVar
 
 _disabled = os.environ.pop("NUMBA_DISABLE_JIT", None)  # read when Numba is imported, and of no use here
 import numba  # noqa: E402
-from llvmlite.binding import parse_bitcode  # noqa: E402
 from numba.core.caching import CompileResultCacheImpl, FunctionCache  # noqa: E402
 from numba.core.serialize import dumps  # noqa: E402
 
@@ -141,7 +140,6 @@ class KernelCache(FunctionCache):  # type: ignore[misc]  # Numba has no types
 
     def save_overload(self, sig: Any, data: Any) -> None:  # noqa: ANN401  Numba has no types
         """Keep compiled code, unless the disk is full or the folder cannot be written to."""
-        _as_loaded(data.library)
         try:
             super().save_overload(sig, data)
         except Exception:  # noqa: BLE001  the code is there for this run
@@ -242,16 +240,6 @@ def _used(function: Callable[..., Any]) -> Iterator[tuple[str, str]]:
 
 def _sorted(options: dict[str, Any]) -> list[tuple[str, Any]]:
     return [(name, sorted(value) if isinstance(value, set) else value) for name, value in sorted(options.items())]
-
-
-def _as_loaded(library: Any) -> None:  # noqa: ANN401  Numba has no types
-    """Make callers link the code of a kernel just compiled as if it had been loaded.
-
-    Writing and reading LLVM's code changes the order in which the optimizer sees it, and so, in kernels that may
-    reorder sums, the last digits: without this the bytes of a result depend on which kernels were kept before.
-    """
-    code = library._get_module_for_linking().as_bitcode()
-    library._shared_module = parse_bitcode(code)
 
 
 def _check() -> None:

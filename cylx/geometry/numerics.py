@@ -1,9 +1,8 @@
 """Numerics for the kernels: linear algebra of a few rows, order statistics, and flags for the order of sums.
 
 All are scalar loops: no allocation, no LAPACK, fast to compile. A kernel that sums over points reads them as `xyz`,
-shape (3, N), one coordinate per row, and allows the compiler to reorder the sums. Then vector instructions process
-several points at once, and fits take a fifth of the time. The rounding differs between processors, as it does in the
-linear algebra of NumPy. It depends on nothing else, not even on the alignment of the points in memory.
+shape (3, N), one coordinate per row. The compiler may not reorder sums or contract products: it would do so differently
+where a kernel is compiled into another, and the last digits would depend on which kernels were kept by an earlier run.
 """
 
 from __future__ import annotations
@@ -16,10 +15,8 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.kernels import njit
 
-REORDERED: Final = {"reassoc", "nsz", "arcp", "contract"}
-"""Optimisations that the compiler may apply to sums; NaN and infinity keep their meaning."""
-FINITE: Final = REORDERED | {"nnan"}
-"""The same, for minima and maxima of finite numbers."""
+NUMBERS: Final = {"nnan", "nsz"}
+"""For minima and maxima of finite numbers: the compiler may take several at once, and the result is the same."""
 
 
 @njit(cache=True, nogil=True)
