@@ -122,8 +122,12 @@ def _flank(measures: Mapping[str, float]) -> float:
 
 
 def _bulge(measures: Mapping[str, float]) -> float:
-    """Return the bulge, at most 0.3, less one so small, for its height, that a real object's form may have it."""
-    return min(max(0.0, abs(measures["bulge"]) - 2.0 * FORM / _height(measures) ** 2), 0.3)
+    """Return the bulge, at most 0.3, less one so small, for its height, that a real object's form may have it.
+
+    A waist may be as large as a bend: few things have one, but rims and lids seen with a wall pull its ends out.
+    """
+    excused = (2.0 if measures["bulge"] > 0.0 else 8.0) * FORM / _height(measures) ** 2
+    return min(max(0.0, abs(measures["bulge"]) - excused), 0.3)
 
 
 def _bend(measures: Mapping[str, float]) -> float:

@@ -157,7 +157,8 @@ def _most_on_line(
     place, shift, most = -1, -1, LEAST_ON_LINE - 1
     counts = np.empty(len(offsets), np.int64)
     for a in range(len(cosines)):
-        counts[:] = 0
+        for b in range(len(offsets)):
+            counts[b] = 0
         for i in range(len(x)):
             along = y[i] * cosines[a] - x[i] * sines[a]
             if CLEAR * radius < along < LINE_LENGTH * radius:

@@ -62,6 +62,43 @@ class WeightSchedule(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
+def _fill_block(
+    xyz: FloatArray,
+    start: int,
+    count: int,
+    model: FloatArray,
+    basis: FloatArray,
+    low: float,
+    high: float,
+    width: float,
+    block: FloatArray,
+) -> None:
+    """Fill in cosine, sine, weight, residual and height of some points.
+
+    What needs roots and divisions sums nothing, so that the processor does several points at once.
+    """
+    px, py, pz, radius = model[0], model[1], model[2], model[RADIUS]
+    ux, uy, uz = model[UX], model[UY], model[UZ]
+    fx, fy, fz = basis[0, 0], basis[0, 1], basis[0, 2]
+    gx, gy, gz = basis[1, 0], basis[1, 1], basis[1, 2]
+    for k in range(count):
+        i = start + k
+        dx, dy, dz = xyz[0, i] - px, xyz[1, i] - py, xyz[2, i] - pz
+        z = dx * ux + dy * uy + dz * uz
+        x = dx * fx + dy * fy + dz * fz
+        y = dx * gx + dy * gy + dz * gz
+        distance = math.sqrt(x * x + y * y) + 1e-300
+        residual = distance - radius
+        ratio = residual / width
+        rest = 1.0 - ratio * ratio
+        weight = rest * rest if rest > 0.0 else 0.0
+        weight = weight if z >= low else 0.0
+        weight = weight if z <= high else 0.0
+        block[0, k], block[1, k], block[2, k] = x / distance, y / distance, weight
+        block[3, k], block[4, k] = residual, z
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
 def _accumulate(
     xyz: FloatArray,
     n: int,
@@ -76,10 +113,6 @@ def _accumulate(
 ) -> None:
     """Fill the weighted normal equations of a step; `sums` gets the weights, and the squares of residuals."""
     fill_basis(model[UX : UZ + 1], basis)
-    px, py, pz, radius = model[0], model[1], model[2], model[RADIUS]
-    ux, uy, uz = model[UX], model[UY], model[UZ]
-    fx, fy, fz = basis[0, 0], basis[0, 1], basis[0, 2]
-    gx, gy, gz = basis[1, 0], basis[1, 1], basis[1, 2]
     block = np.empty((5, BLOCK))
     weights, squares = 0.0, 0.0
     # with (cos, sin, z cos, z sin, 1) as the row of a point, sums of products are shared; scalars stay in registers
@@ -89,22 +122,7 @@ def _accumulate(
     rc, rs, rzc, rzs, r = 0.0, 0.0, 0.0, 0.0, 0.0
     for start in range(0, n, BLOCK):
         count = min(BLOCK, n - start)
-        # what needs roots and divisions sums nothing, so that several points are done at once
-        for k in range(count):
-            i = start + k
-            dx, dy, dz = xyz[0, i] - px, xyz[1, i] - py, xyz[2, i] - pz
-            z = dx * ux + dy * uy + dz * uz
-            x = dx * fx + dy * fy + dz * fz
-            y = dx * gx + dy * gy + dz * gz
-            distance = math.sqrt(x * x + y * y) + 1e-300
-            residual = distance - radius
-            ratio = residual / width
-            rest = 1.0 - ratio * ratio
-            weight = rest * rest if rest > 0.0 else 0.0
-            weight = weight if z >= low else 0.0
-            weight = weight if z <= high else 0.0
-            block[0, k], block[1, k], block[2, k] = x / distance, y / distance, weight
-            block[3, k], block[4, k] = residual, z
+        _fill_block(xyz, start, count, model, basis, low, high, width, block)
         for k in range(count):
             weight = block[2, k]
             if weight == 0.0:

@@ -25,7 +25,7 @@ from cylx.records import (
 )
 from cylx.scene import Prepared
 from cylx.scene.cautions import damage
-from cylx.stages.averaging import inflation
+from cylx.stages.finishing import inflation
 from cylx.stages.labelling import label_points, surface_points
 
 

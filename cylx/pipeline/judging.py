@@ -9,7 +9,9 @@ from cylx.game.agreement import Neighbourhood, is_contradicted
 from cylx.records import Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
 from cylx.stages.arcs import arcs_of
-from cylx.stages.averaging import ENOUGH_TO_JUDGE, finish, inflation, refit
+from cylx.stages.averaging import ENOUGH_TO_JUDGE
+from cylx.stages.finishing import finish, inflation
+from cylx.stages.refitting import refit
 from cylx.stages.verification import Verdict, may_be_arc, verify
 
 SHORTEST_PIECE = 5.0

@@ -8,21 +8,19 @@ accuracy of a fit to the segmented cylinder.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from cylx.config import AveragingConfig
-from cylx.fits.conditioning import given_radius
-from cylx.fits.likelihood import Prior, fit_mixture
-from cylx.fits.nominal_radius import Catalogue, choose_entry
-from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder, unbiased_radius
+from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.crossings import between_crossings, evened
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, distances_to, points_on
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Segment
+from cylx.stages.refitting import LEAST_POINTS_OF_AVERAGE, LEAST_WIDTH, ROUGH_TOLERANCE, own_points, refit, shell_of
 
 MARGIN_OF_AVERAGE = 0.4
 """Candidates speak for their places and this share of their extents to either side."""
@@ -39,38 +37,24 @@ NARROW_SHELLS, NARROW_TIMES = (0.002, 0.01), 4.0
 """Half widths in radii of narrow shells, which are enough where points are so many times denser in them than about."""
 SHELL_MARGIN = 8.0
 """Points are gathered this many noises beyond the shell: it moves with the fit."""
-LEAST_WIDTH = 3.0
-"""The width of the weights does not fall below this many noises: a Gaussian ends there."""
 SURFACE_WIDTH, MOST_SPREAD = 3.0, 2.0
 """Points within so many deviations are on the surface; no deviation is taken for more than so many noises."""
 MOST_RADIUS_RATIO = 2.0
 """A fit whose radius changes more than this has left the candidates it came from."""
-LEAST_POINTS_OF_AVERAGE = 20
-"""Without so many points five parameters are not fitted robustly."""
 SHORTEST_HALF, SHORTEST_SPACINGS = 0.02, 0.5
 """A cylinder has at least this half height, in radii or in spacings: what is shorter is a circle."""
 SETTLED = 0.01
 """Growth ends when half the height changes less than this share of itself and of the radius."""
-SHELL_OF_FIT, LEAST_SHELL_OF_FIT = 4.0, 0.02
-"""Half width of the shell of the last fits: in noises, and at least in radii, as real surfaces are no cylinders."""
-REFIT_STEPS, MOST_REFIT_STEPS = 15, 60
-"""Gauss-Newton steps of a fit to a sample of the points, and of one to all of them, which goes to its fixed point."""
 DOUBT_INSIDE = 0.4
 """A piece of the height that was found to belong before is asked for this share of what one beyond the ends is."""
 STRICT_FLATNESS, STRICT_FROM_RADIUS = 0.75, 5.0
 """While a cylinder grows, points in flat windows of this share of what is too flat are left out, too, so that it does
 not follow what it touches, such as the floor under a can; but if its radius is fewer spacings than these, the strip
 that is seen of it may be flat itself."""
-ROUGH_TOLERANCE = 0.02
-"""While a cylinder grows, a fit may end at steps of this share of the spread."""
 ENOUGH_TO_GROW = 6000
 """Points that suffice while a cylinder grows."""
 ENOUGH_TO_JUDGE = 20000
 """Points that suffice to judge it; the last fit takes all."""
-STRUCTURED_LACK_OF_FIT = 1.4
-"""A lack of fit (chi-square per cell) beyond this is none by chance."""
-WIDEST_IN_LAST_FIT = 8.0
-"""Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
 MOST_FORM, MOST_FORM_NOISES = 0.04, 6.0
 """Scatter that a surface may have beyond that, as a share of the radius, and in noises."""
 LEAST_COSINE = math.cos(math.radians(25.0))
@@ -139,16 +123,17 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
         shell = max((LATER_SHELL if step else FIRST_SHELL) * model[RADIUS], LEAST_SHELL * noise)
         width = shell + SHELL_MARGIN * noise
         strict = STRICT_FLATNESS if model[RADIUS] > STRICT_FROM_RADIUS else 1.0
-        points = _own_points(indexed, model, half + beyond, width, ENOUGH_TO_JUDGE, strict)
+        points = own_points(indexed, model, half + beyond, width, ENOUGH_TO_JUDGE, strict)
         if len(points) < LEAST_POINTS_OF_AVERAGE:
             return "too few points"
         stride = max(1, len(points) // ENOUGH_TO_GROW)
         shell = _narrowed(points, model, half, shell, noise)
+        some = points[::stride]
+        some = some[evened((some - model[POINT]) @ model[DIRECTION], half)]
         schedule = WeightSchedule(shell, LEAST_WIDTH * noise, 1.0, TUKEY * TUKEY_SPREAD, ROUGH_TOLERANCE)
         end = FIT_BEYOND_ENDS * half
-        fit = fit_cylinder(
-            points[::stride], model, low=-end, high=end, schedule=schedule, steps=LATER_STEPS if step else FIRST_STEPS
-        )
+        steps = LATER_STEPS if step else FIRST_STEPS
+        fit = fit_cylinder(some, model, low=-end, high=end, schedule=schedule, steps=steps)
         if fit is None:
             return "no fit"
         model, spread = fit
@@ -169,7 +154,23 @@ def refine(segment: Segment, indexed: IndexedCloud) -> Segment | str:
             return "too short"
         if step and abs(half - before) < SETTLED * before + SETTLED * model[RADIUS]:
             break
-    return refit(Segment(model, half, noise), indexed, most=ENOUGH_TO_JUDGE)
+    return _refit_between_crossings(Segment(model, half, noise), indexed)
+
+
+def _refit_between_crossings(segment: Segment, indexed: IndexedCloud) -> Segment | str:
+    """Fit a cylinder to its points, without the ends that lids, rims and tables cross."""
+    fitted = refit(segment, indexed, most=ENOUGH_TO_JUDGE, even=True)
+    if isinstance(fitted, str):
+        return fitted
+    points, width = shell_of(fitted, indexed, ENOUGH_TO_JUDGE)
+    heights, residuals = distances_to(points, fitted.model)
+    deviation = min(max(fitted.spread, 1e-9 * fitted.radius), 0.5 * width)
+    low, high = between_crossings(heights, residuals, fitted.half, SURFACE_WIDTH * deviation, 2.0 * width)
+    if high - low > (1.0 - 1e-9) * 2.0 * fitted.half:
+        return refit(segment, indexed, most=ENOUGH_TO_JUDGE)
+    model = fitted.model.copy()
+    model[POINT] += 0.5 * (low + high) * model[DIRECTION]
+    return refit(replace(fitted, model=model, half=0.5 * (high - low)), indexed, most=ENOUGH_TO_JUDGE)
 
 
 def _narrowed(points: FloatArray, model: FloatArray, half: float, shell: float, noise: float) -> float:
@@ -187,155 +188,3 @@ def _narrowed(points: FloatArray, model: FloatArray, half: float, shell: float, 
         if narrow < shell and within >= LEAST_POINTS_OF_AVERAGE and dense:
             return float(narrow)
     return shell
-
-
-def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None) -> Segment | str:
-    """Fit a cylinder to its points between its ends, to the fixed point of the robust estimate.
-
-    Parameters
-    ----------
-    segment : Segment
-    indexed : IndexedCloud
-    most : int, optional
-        Points that suffice; all by default.
-
-    Returns
-    -------
-    Segment or str
-        With the bias of the radius taken off; or why there is none.
-    """
-    fit = _robust_fit(
-        *_shell(segment, indexed, most), segment, indexed, steps=REFIT_STEPS if most else MOST_REFIT_STEPS
-    )
-    if fit is None:
-        return "no fit"
-    model, spread = fit
-    model[RADIUS] = unbiased_radius(model[RADIUS], min(spread, 0.5 * model[RADIUS]))
-    return replace(segment, model=model, spread=spread, covariance=None, choice=None)
-
-
-def inflation(measures: Mapping[str, float]) -> float:
-    """Return how many times larger a covariance is than noise makes it, from what the verification measured.
-
-    Where the residuals are structured beyond noise, because the object is no perfect cylinder or its noise is shared by
-    neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
-    """
-    lack = measures.get("lack_of_fit", 1.0)
-    return lack if lack > STRUCTURED_LACK_OF_FIT else 1.0
-
-
-def finish(
-    segment: Segment,
-    indexed: IndexedCloud,
-    known: Prior | None = None,
-    catalogue: Catalogue | None = None,
-    *,
-    inflated: float = 1.0,
-) -> Segment | str:
-    """Fit a cylinder to all its points by maximum likelihood, and say how uncertain it is.
-
-    What is known draws the fit to it, as far as the points do not contradict it: a prior that is wrong by many
-    standard deviations would spoil the fit. A nominal radius draws the fit only where the points bear it out.
-
-    Parameters
-    ----------
-    segment : Segment
-    indexed : IndexedCloud
-    known : Prior, optional
-    catalogue : Catalogue, optional
-        Nominal radii, in the unit of the cloud's frame.
-    inflated : float
-        `inflation` of its covariance. If it is above 1, the object is no perfect cylinder, and its residuals are no
-        noise. The likelihood would be that of its most cylindrical part; the robust fit is drawn by all of it, and
-        stays.
-
-    Returns
-    -------
-    Segment or str
-        With its covariance, not inflated; that of `refit` without one if the points are too few for it; or why there
-        is none.
-    """
-    points, width = _shell(segment, indexed, None)
-    fit = _robust_fit(points, width, segment, indexed, steps=REFIT_STEPS, tolerance=ROUGH_TOLERANCE)
-    if fit is None:
-        return "no fit"
-    model, spread = fit
-    _turn_as_given(model)
-    end, deviation = (
-        FIT_BEYOND_ENDS * segment.half,
-        max(spread, 1e-9 * model[RADIUS]),
-    )  # points may lie on the surface exactly
-    limits = {
-        "low": -end,
-        "high": end,
-        "width": min(WIDEST_IN_LAST_FIT * deviation, 2.0 * width),
-        "deviation": deviation,
-    }
-    likely = fit_mixture(points, model, **limits)
-    if likely is None:
-        return refit(segment, indexed)
-    prior = None if known is None else known.as_far_as_borne_out(likely)
-    robust = inflated > 1.0 and prior is None
-    if robust:
-        fitted = refit(segment, indexed)
-        if isinstance(fitted, str):
-            return fitted
-        free = replace(fitted, covariance=likely.covariance)
-    else:
-        if prior is not None:
-            likely = fit_mixture(points, model, **limits, prior=prior) or likely
-        free = replace(segment, model=likely.model, spread=spread, covariance=likely.covariance, choice=None)
-    if catalogue is None:
-        return free
-    choice = choose_entry(free.radius, math.sqrt(inflated * likely.covariance[4, 4]), catalogue)
-    if choice.decision != "snapped":
-        return replace(free, choice=choice)
-    nominal = catalogue.radii[choice.entry]
-    # inflated with the rest, it is the tolerance again, and the points weigh as little as they should
-    tolerance = catalogue.tolerances[choice.entry] / math.sqrt(inflated)
-    snapping = (prior or Prior())._replace(radius=nominal, radius_deviation=tolerance)
-    snapped = None if robust else fit_mixture(points, model, **limits, prior=snapping)
-    if snapped is not None:
-        return replace(free, model=snapped.model, spread=spread, covariance=snapped.covariance, choice=choice)
-    start = free.model.copy()
-    _turn_as_given(start)
-    moved, covariance = given_radius(start, likely.covariance, nominal, tolerance)
-    return replace(free, model=moved, covariance=covariance, choice=choice)
-
-
-def _turn_as_given(model: FloatArray) -> None:
-    """Turn the direction of a model as the result has it, which the covariance goes by: its largest part positive."""
-    direction = model[DIRECTION]
-    direction *= np.sign(direction[np.abs(direction).argmax()])
-
-
-def _shell(segment: Segment, indexed: IndexedCloud, most: int | None) -> tuple[FloatArray, float]:
-    """Return the points about the surface of a segment, and how near to it those lie that have a say at first."""
-    width = max(SHELL_OF_FIT * indexed.noise_about(segment.model, segment.half), LEAST_SHELL_OF_FIT * segment.radius)
-    end = FIT_BEYOND_ENDS * segment.half
-    return _own_points(indexed, segment.model, end, 2.0 * width, most, segment.flat_share), width
-
-
-def _robust_fit(
-    points: FloatArray, width: float, segment: Segment, indexed: IndexedCloud, *, steps: int, tolerance: float = 1e-9
-) -> tuple[FloatArray, float] | None:
-    """Fit a cylinder to the points of a segment; give it and the standard deviation about it."""
-    noise, end = indexed.noise_about(segment.model, segment.half), FIT_BEYOND_ENDS * segment.half
-    schedule = WeightSchedule(width, LEAST_WIDTH * noise, 1.0, TUKEY * TUKEY_SPREAD, tolerance)
-    if len(points) < LEAST_POINTS_OF_AVERAGE:
-        return None
-    fit = fit_cylinder(points, segment.model, low=-end, high=end, schedule=schedule, steps=steps)
-    return None if fit is None else (fit[0], fit[1] * TUKEY_SPREAD)
-
-
-def _own_points(
-    indexed: IndexedCloud, model: FloatArray, half: float, width: float, most: int | None, strict: float = 1.0
-) -> FloatArray:
-    """Return points near a cylinder's surface not of something flatter, about `most` of them."""
-    limit = strict * indexed.too_flat(model[RADIUS])
-    if indexed.normals is None:
-        return indexed.cells.surface_points(model, half, width, most, indexed.flatness, limit)
-    radius = float(model[RADIUS])
-    near = indexed.cells.near_cylinder(model, -half, half, max(0.0, radius - width), radius + width)
-    near = near[indexed.may_be_on(near, model) & (indexed.flatness[near] < limit)]
-    return indexed.points[near[:: max(1, len(near) // most) if most else 1]]

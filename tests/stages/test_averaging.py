@@ -11,8 +11,9 @@ from cylx.geometry.cells import Cells
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
-from cylx.stages.averaging import average_cluster, refine, refit
+from cylx.stages.averaging import average_cluster, refine
 from cylx.stages.measuring import measure_extent
+from cylx.stages.refitting import refit
 from cylx.synthetic import single
 
 seeds = st.integers(0, 2**32 - 1)
@@ -252,3 +253,20 @@ def test_another_wall_does_not_draw_a_fit_without_noise(other, low, high):
     found = refine(Segment(start, 1.0 / frame.spacing, 0.0), indexed)
     assert_true(found, truth, 1e-4)
     assert found.half * frame.spacing == pytest.approx(2.0, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_lid_and_table_do_not_draw_the_fit_of_a_low_tin(seed):
+    rng, noise = np.random.default_rng(seed), 0.04
+    angles, heights = rng.uniform(-1.2, 1.2, 3000), rng.uniform(-0.4, 0.4, 3000)
+    side = np.column_stack([np.cos(angles), np.sin(angles), heights])
+    away, turn = np.sqrt(rng.uniform(0.0, 1.0, 9000)), rng.uniform(-np.pi, np.pi, 9000)
+    lid = np.column_stack([away * np.cos(turn), away * np.sin(turn), np.full(9000, 0.4)])
+    away, turn = rng.uniform(1.0, 2.0, 9000), rng.uniform(-1.2, 1.2, 9000)
+    table = np.column_stack([away * np.cos(turn), away * np.sin(turn), np.full(9000, -0.4)])
+    points = np.vstack([side, lid, table]) + noise * rng.standard_normal((21000, 3))
+    indexed, frame = ground_of(points, noise)
+    start = np.concatenate([-frame.origin, [0, 0, frame.spacing], [1.03]]) / frame.spacing
+    found = refine(Segment(start, 0.3 / frame.spacing, noise / frame.spacing), indexed)
+    assert abs(found.radius * frame.spacing - 1.0) < 0.012
+    assert found.half * frame.spacing < 0.4

@@ -14,7 +14,7 @@ from cylx.geometry.cylinder import axis_basis
 from cylx.records import IndexedCloud, Noise, Segment
 from cylx.results import Result, result_schema
 from cylx.scene import make_frame
-from cylx.stages.averaging import finish, inflation
+from cylx.stages.finishing import finish, inflation
 from cylx.synthetic import single
 
 LISTED = [{"name": "DN40", "radius": 0.8}, {"name": "DN50", "radius": 1.0, "tolerance": 1e-3}, {"radius": 1.25}]

@@ -1,0 +1,118 @@
+"""The last fit of a cylinder, to all its points, and how uncertain it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from cylx.fits.conditioning import given_radius
+from cylx.fits.likelihood import Prior, fit_mixture
+from cylx.fits.nominal_radius import Catalogue, choose_entry
+from cylx.fits.robust import FIT_BEYOND_ENDS
+from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import DIRECTION, RADIUS
+from cylx.records import IndexedCloud, Segment
+from cylx.stages.refitting import REFIT_STEPS, ROUGH_TOLERANCE, refit, robust_fit, shell_of
+
+STRUCTURED_LACK_OF_FIT = 1.4
+"""A lack of fit (chi-square per cell) beyond this is none by chance."""
+WIDEST_IN_LAST_FIT = 8.0
+"""Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
+
+
+def inflation(measures: Mapping[str, float]) -> float:
+    """Return how many times larger a covariance is than noise makes it, from what the verification measured.
+
+    Where the residuals are structured beyond noise, because the object is no perfect cylinder or its noise is shared by
+    neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
+    """
+    lack = measures.get("lack_of_fit", 1.0)
+    return lack if lack > STRUCTURED_LACK_OF_FIT else 1.0
+
+
+def finish(
+    segment: Segment,
+    indexed: IndexedCloud,
+    known: Prior | None = None,
+    catalogue: Catalogue | None = None,
+    *,
+    inflated: float = 1.0,
+) -> Segment | str:
+    """Fit a cylinder to all its points by maximum likelihood, and say how uncertain it is.
+
+    What is known draws the fit to it, as far as the points do not contradict it: a prior that is wrong by many
+    standard deviations would spoil the fit. A nominal radius draws the fit only where the points bear it out.
+
+    Parameters
+    ----------
+    segment : Segment
+    indexed : IndexedCloud
+    known : Prior, optional
+    catalogue : Catalogue, optional
+        Nominal radii, in the unit of the cloud's frame.
+    inflated : float
+        `inflation` of its covariance. If it is above 1, the object is no perfect cylinder, and its residuals are no
+        noise. The likelihood would be that of its most cylindrical part; the robust fit is drawn by all of it, and
+        stays.
+
+    Returns
+    -------
+    Segment or str
+        With its covariance, not inflated; that of `refit` without one if the points are too few for it; or why there
+        is none.
+    """
+    points, width = shell_of(segment, indexed, None)
+    fit = robust_fit(points, width, segment, indexed, steps=REFIT_STEPS, tolerance=ROUGH_TOLERANCE)
+    if fit is None:
+        return "no fit"
+    model, spread = fit
+    _turn_as_given(model)
+    end, deviation = (
+        FIT_BEYOND_ENDS * segment.half,
+        max(spread, 1e-9 * model[RADIUS]),
+    )  # points may lie on the surface exactly
+    limits = {
+        "low": -end,
+        "high": end,
+        "width": min(WIDEST_IN_LAST_FIT * deviation, 2.0 * width),
+        "deviation": deviation,
+    }
+    likely = fit_mixture(points, model, **limits)
+    if likely is None:
+        return refit(segment, indexed)
+    prior = None if known is None else known.as_far_as_borne_out(likely)
+    robust = inflated > 1.0 and prior is None
+    if robust:
+        fitted = refit(segment, indexed)
+        if isinstance(fitted, str):
+            return fitted
+        free = replace(fitted, covariance=likely.covariance)
+    else:
+        if prior is not None:
+            likely = fit_mixture(points, model, **limits, prior=prior) or likely
+        free = replace(segment, model=likely.model, spread=spread, covariance=likely.covariance, choice=None)
+    if catalogue is None:
+        return free
+    choice = choose_entry(free.radius, math.sqrt(inflated * likely.covariance[4, 4]), catalogue)
+    if choice.decision != "snapped":
+        return replace(free, choice=choice)
+    nominal = catalogue.radii[choice.entry]
+    # inflated with the rest, it is the tolerance again, and the points weigh as little as they should
+    tolerance = catalogue.tolerances[choice.entry] / math.sqrt(inflated)
+    snapping = (prior or Prior())._replace(radius=nominal, radius_deviation=tolerance)
+    snapped = None if robust else fit_mixture(points, model, **limits, prior=snapping)
+    if snapped is not None:
+        return replace(free, model=snapped.model, spread=spread, covariance=snapped.covariance, choice=choice)
+    start = free.model.copy()
+    _turn_as_given(start)
+    moved, covariance = given_radius(start, likely.covariance, nominal, tolerance)
+    return replace(free, model=moved, covariance=covariance, choice=choice)
+
+
+def _turn_as_given(model: FloatArray) -> None:
+    """Turn the direction of a model as the result has it, which the covariance goes by: its largest part positive."""
+    direction = model[DIRECTION]
+    direction *= np.sign(direction[np.abs(direction).argmax()])
