@@ -25,7 +25,6 @@ from cylx.records import (
 )
 from cylx.scene import Prepared
 from cylx.scene.cautions import damage
-from cylx.stages.finishing import inflation
 from cylx.stages.labelling import label_points, surface_points
 
 
@@ -124,12 +123,12 @@ def _form(finding: Finding | RejectedSegment, spacing: float) -> float | None:
 
 
 def _covariance(finding: Finding, spacing: float) -> FloatArray | None:
-    """Put the covariance of a finding into scene units, inflated as its residuals ask for."""
+    """Put the covariance of a finding into scene units."""
     covariance = finding.segment.covariance
     if covariance is None:
         return None
     units = np.array([spacing, spacing, 1.0, 1.0, spacing])
-    return np.asarray(covariance * np.outer(units, units) * inflation(finding.measures))
+    return np.asarray(covariance * np.outer(units, units))
 
 
 def _nominal(finding: Finding, config: Config, spacing: float) -> NominalRadius | None:

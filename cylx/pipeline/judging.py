@@ -8,10 +8,10 @@ from dataclasses import replace
 from cylx.game.agreement import Neighbourhood, is_contradicted
 from cylx.records import Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
+from cylx.segments.finishing import finish, inflation
+from cylx.segments.refitting import refit
 from cylx.stages.arcs import arcs_of
 from cylx.stages.averaging import ENOUGH_TO_JUDGE
-from cylx.stages.finishing import finish, inflation
-from cylx.stages.refitting import refit
 from cylx.stages.verification import Verdict, may_be_arc, verify
 
 SHORTEST_PIECE = 5.0

@@ -20,7 +20,7 @@ from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, distances_to, point
 from cylx.geometry.dual_quaternions import blend, line_screws, move_points, turn_vectors
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Segment
-from cylx.stages.refitting import LEAST_POINTS_OF_AVERAGE, LEAST_WIDTH, ROUGH_TOLERANCE, own_points, refit, shell_of
+from cylx.segments.refitting import LEAST_POINTS_OF_AVERAGE, LEAST_WIDTH, ROUGH_TOLERANCE, own_points, refit, shell_of
 
 MARGIN_OF_AVERAGE = 0.4
 """Candidates speak for their places and this share of their extents to either side."""

@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from cylx.config import CandidatesConfig
-from cylx.fits.robust import move_to_foot, polish
+from cylx.fits.polish import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import RADIUS, UX, UZ
 from cylx.geometry.kernels import njit

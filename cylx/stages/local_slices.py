@@ -13,7 +13,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from cylx.config import SlicingConfig
-from cylx.fits.robust import move_to_foot, polish
+from cylx.fits.polish import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.circle import search_circle
 from cylx.geometry.cylinder import RADIUS, UX

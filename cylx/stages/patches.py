@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.config import CandidatesConfig
-from cylx.fits.robust import move_to_foot, polish
+from cylx.fits.polish import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.kernels import njit
 from cylx.geometry.morton import cell_starts, gather_ball

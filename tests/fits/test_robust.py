@@ -8,17 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from cylx.fits.robust import (
-    SHARP,
-    TUKEY,
-    TUKEY_SPREAD,
-    WeightSchedule,
-    candidate_quality,
-    fit_cylinder,
-    move_to_foot,
-    polish,
-    unbiased_radius,
-)
+from cylx.fits.polish import SHARP, candidate_quality, move_to_foot, polish
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder, unbiased_radius
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=30, deadline=None)

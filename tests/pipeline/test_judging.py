@@ -8,7 +8,7 @@ from cylx.game.agreement import Neighbourhood
 from cylx.pipeline.judging import SHORTEST_PIECE, Judge
 from cylx.records import Candidates, Finding, IndexedCloud, PointCloud, RejectedSegment, Segment
 from cylx.scene import prepare
-from cylx.stages.refitting import refit
+from cylx.segments.refitting import refit
 
 SIGMA = 0.03
 """Scatter of bark, in radii."""

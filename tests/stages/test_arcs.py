@@ -8,8 +8,8 @@ from cylx.evidence.measures import edge_gain, look_at
 from cylx.geometry.cells import Cells
 from cylx.records import IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
+from cylx.segments.refitting import refit
 from cylx.stages.arcs import arcs_of
-from cylx.stages.refitting import refit
 
 SIGMA, LENGTH, HALF = 0.02, 2.0, 2.0
 """Noise, length of the planes and half the height of the arc; its radius is 1."""

@@ -11,9 +11,9 @@ from cylx.geometry.cells import Cells
 from cylx.geometry.extent import visible_extent
 from cylx.records import Candidates, Cluster, IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
+from cylx.segments.refitting import refit
 from cylx.stages.averaging import average_cluster, refine
 from cylx.stages.measuring import measure_extent
-from cylx.stages.refitting import refit
 from cylx.synthetic import single
 
 seeds = st.integers(0, 2**32 - 1)

@@ -8,7 +8,7 @@ from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder
 from cylx.records import IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
-from cylx.stages.refitting import refit
+from cylx.segments.refitting import refit
 from cylx.stages.verification import verify
 from cylx.synthetic.surfaces import Frustum, Mantle
 

@@ -13,9 +13,11 @@ MAY_IMPORT = {
     "api": {"config", "evaluation", "geometry", "io", "pipeline", "records", "results", "scene", "stages"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
-        "baselines", "config", "errors", "evidence", "fits", "game", "geometry", "records", "scene", "stages",
+        "baselines", "config", "errors", "evidence", "fits", "game", "geometry", "records", "scene", "segments",
+        "stages",
     },
-    "stages": {"config", "evidence", "fits", "game", "geometry", "records"},
+    "stages": {"config", "evidence", "fits", "game", "geometry", "records", "segments"},
+    "segments": {"fits", "geometry", "records"},
     "report": {"config", "errors", "geometry", "optional", "palette", "records", "results"},
     "export": {"errors", "geometry", "harmless", "optional", "results", "version"},
     "scene": {"config", "errors", "fits", "geometry", "records"},

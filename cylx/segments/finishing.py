@@ -9,25 +9,28 @@ from dataclasses import replace
 import numpy as np
 
 from cylx.fits.conditioning import given_radius
+from cylx.fits.correlated_error import shared_covariance
 from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.fits.nominal_radius import Catalogue, choose_entry
 from cylx.fits.robust import FIT_BEYOND_ENDS
 from cylx.geometry.arrays import FloatArray
-from cylx.geometry.cylinder import DIRECTION, RADIUS
+from cylx.geometry.cylinder import DIRECTION, RADIUS, coordinates_of
 from cylx.records import IndexedCloud, Segment
-from cylx.stages.refitting import REFIT_STEPS, ROUGH_TOLERANCE, refit, robust_fit, shell_of
+from cylx.segments.refitting import REFIT_STEPS, ROUGH_TOLERANCE, refit, robust_fit, shell_of
 
 STRUCTURED_LACK_OF_FIT = 1.4
 """A lack of fit (chi-square per cell) beyond this is none by chance."""
 WIDEST_IN_LAST_FIT = 8.0
 """Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
+ON_SURFACE = 3.0
+"""Points within so many deviations are on the surface."""
 
 
 def inflation(measures: Mapping[str, float]) -> float:
-    """Return how many times larger a covariance is than noise makes it, from what the verification measured.
+    """Return how many times larger a covariance is than noise makes it, as far as one number tells.
 
     Where the residuals are structured beyond noise, because the object is no perfect cylinder or its noise is shared by
-    neighbours, the parameters are as much less certain as the mean residuals over its surface scatter more.
+    neighbours, the parameters are less certain at least as much as the mean residuals over its surface scatter more.
     """
     lack = measures.get("lack_of_fit", 1.0)
     return lack if lack > STRUCTURED_LACK_OF_FIT else 1.0
@@ -54,14 +57,14 @@ def finish(
     catalogue : Catalogue, optional
         Nominal radii, in the unit of the cloud's frame.
     inflated : float
-        `inflation` of its covariance. If it is above 1, the object is no perfect cylinder, and its residuals are no
+        `inflation` of the measures. If it is above 1, the object is no perfect cylinder, and its residuals are no
         noise. The likelihood would be that of its most cylindrical part; the robust fit is drawn by all of it, and
         stays.
 
     Returns
     -------
     Segment or str
-        With its covariance, not inflated; that of `refit` without one if the points are too few for it; or why there
+        With its covariance; that of `refit` without one if the points are too few for it; or why there
         is none.
     """
     points, width = shell_of(segment, indexed, None)
@@ -89,27 +92,39 @@ def finish(
         fitted = refit(segment, indexed)
         if isinstance(fitted, str):
             return fitted
-        free = replace(fitted, covariance=likely.covariance)
+        _turn_as_given(fitted.model)
+        covariance = _with_shared_error(likely.covariance, points, fitted, inflated)
+        free = replace(fitted, covariance=covariance)
     else:
         if prior is not None:
             likely = fit_mixture(points, model, **limits, prior=prior) or likely
-        free = replace(segment, model=likely.model, spread=spread, covariance=likely.covariance, choice=None)
+        covariance = inflated * likely.covariance
+        free = replace(segment, model=likely.model, spread=spread, covariance=covariance, choice=None)
     if catalogue is None:
         return free
-    choice = choose_entry(free.radius, math.sqrt(inflated * likely.covariance[4, 4]), catalogue)
+    choice = choose_entry(free.radius, math.sqrt(covariance[4, 4]), catalogue)
     if choice.decision != "snapped":
         return replace(free, choice=choice)
-    nominal = catalogue.radii[choice.entry]
+    nominal, tolerance = catalogue.radii[choice.entry], catalogue.tolerances[choice.entry]
     # inflated with the rest, it is the tolerance again, and the points weigh as little as they should
-    tolerance = catalogue.tolerances[choice.entry] / math.sqrt(inflated)
-    snapping = (prior or Prior())._replace(radius=nominal, radius_deviation=tolerance)
+    deviation = tolerance / math.sqrt(inflated)
+    snapping = (prior or Prior())._replace(radius=nominal, radius_deviation=deviation)
     snapped = None if robust else fit_mixture(points, model, **limits, prior=snapping)
     if snapped is not None:
-        return replace(free, model=snapped.model, spread=spread, covariance=snapped.covariance, choice=choice)
+        covariance = inflated * snapped.covariance
+        return replace(free, model=snapped.model, spread=spread, covariance=covariance, choice=choice)
     start = free.model.copy()
     _turn_as_given(start)
-    moved, covariance = given_radius(start, likely.covariance, nominal, tolerance)
+    moved, covariance = given_radius(start, covariance, nominal, tolerance)
     return replace(free, model=moved, covariance=covariance, choice=choice)
+
+
+def _with_shared_error(covariance: FloatArray, points: FloatArray, fitted: Segment, inflated: float) -> FloatArray:
+    """Add what the errors that points share do to a covariance; multiply it where too little is seen to tell."""
+    heights, residuals, angles = coordinates_of(points, np.arange(len(points)), fitted.model)
+    on = (np.abs(residuals) < ON_SURFACE * fitted.spread) & (np.abs(heights) <= FIT_BEYOND_ENDS * fitted.half)
+    shared = shared_covariance(heights[on], residuals[on], angles[on], fitted.radius)
+    return np.asarray(inflated * covariance if shared is None else covariance + shared, dtype=np.float64)
 
 
 def _turn_as_given(model: FloatArray) -> None:

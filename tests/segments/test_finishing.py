@@ -14,7 +14,7 @@ from cylx.geometry.cylinder import axis_basis
 from cylx.records import IndexedCloud, Noise, Segment
 from cylx.results import Result, result_schema
 from cylx.scene import make_frame
-from cylx.stages.finishing import finish, inflation
+from cylx.segments.finishing import finish, inflation
 from cylx.synthetic import single
 
 LISTED = [{"name": "DN40", "radius": 0.8}, {"name": "DN50", "radius": 1.0, "tolerance": 1e-3}, {"radius": 1.25}]
@@ -153,14 +153,14 @@ def ground_of(points, noise):
 
 
 def last_fit(indexed, frame, catalogue=None, inflated=1.0):
-    """Finish an upright cylinder about the origin; give choice, model and inflated covariance in scene units."""
+    """Finish an upright cylinder about the origin; give choice, model and covariance in scene units."""
     model = np.concatenate([-frame.origin, [0, 0, frame.spacing], [1.0]]) / frame.spacing
     if catalogue is not None:
         catalogue = Catalogue(*(tuple(x / frame.spacing for x in part) for part in catalogue))
     fit = finish(Segment(model, 2.0 / frame.spacing, 0.0), indexed, None, catalogue, inflated=inflated)
     units = np.array([frame.spacing, frame.spacing, 1.0, 1.0, frame.spacing])
     point, radius = fit.model[:3] * frame.spacing + frame.origin, fit.model[6] * frame.spacing
-    covariance = fit.covariance * np.outer(units, units) * inflated
+    covariance = fit.covariance * np.outer(units, units)
     return fit.choice, np.array([*point, *fit.model[3:6], radius]), covariance
 
 
@@ -218,10 +218,18 @@ def test_a_lack_of_fit_inflates_from_where_it_is_none_by_chance():
 
 
 def test_the_structure_of_an_object_makes_its_radius_less_certain():
-    indexed = ground_of(np.array(single(points=2000, sigma=0.01, theta_deg=90, seed=2).points), 0.01)
+    points = np.array(single(points=2000, sigma=0.01, theta_deg=90, seed=2).points)
+    angles = np.arctan2(points[:, 1], points[:, 0])
+    points[:, :2] *= 1.0 + 0.02 * (np.sin(10.0 * angles) * np.cos(4.0 * points[:, 2]))[:, None]
+    indexed = ground_of(points, 0.01)
     sure, unsure = (last_fit(*indexed, ((1.0,), (1e-3,)), inflated=inflated)[0] for inflated in (1.0, 9.0))
-    assert unsure.deviation == pytest.approx(3 * sure.deviation, rel=1e-6)
-    assert unsure.ratio < sure.ratio
+    assert unsure.deviation > 2.0 * sure.deviation
+
+
+def test_where_too_little_is_seen_to_tell_the_covariance_is_multiplied():
+    indexed = ground_of(np.array(single(points=30, sigma=0.01, theta_deg=60, seed=2).points), 0.01)
+    one, nine = (last_fit(*indexed, inflated=inflated)[2] for inflated in (1.0, 9.0))
+    assert np.allclose(nine, 9.0 * one, rtol=1e-9)
 
 
 # the command line

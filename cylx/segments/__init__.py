@@ -1,0 +1,1 @@
+"""Fits of a segment to its points of the cloud, and how uncertain they are."""
