@@ -18,7 +18,7 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.kernels import njit
 
-COLUMNS, ROWS = 24, 6
+COLUMNS, ROWS = 20, 5
 """Cells about the axis and along it."""
 FEWEST_CELLS = 12
 """With fewer cells five parameters, a variance and a length are not told apart."""
@@ -26,7 +26,7 @@ UNSHARED = 1.4
 """Chi-square a cell up to which there is no sign of anything but white noise."""
 LENGTHS = np.geomspace(0.25, 32.0, 8)
 """Lengths that are tried, in sides of a cell."""
-VARIANCES = np.geomspace(1.0 / 16.0, 256.0, 13)
+VARIANCES = np.geomspace(1.0 / 16.0, 128.0, 9)
 """Variances that are tried, in mean squares of the cells' residuals, for a length of up to one side; little of a long
 wave is left in the residuals, so that its variance is larger by its length."""
 
