@@ -10,6 +10,8 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import settings
 
+from tests.support.patience import PATIENCE
+
 # the examples are the same in every run; `pytest --hypothesis-profile search` looks for others, and for longer
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("search", max_examples=1000, deadline=None)
@@ -83,7 +85,7 @@ def spawn_cylx():
     def spawn(*args, prelude="", **settings):
         code = f"{prelude}\nfrom cylx.cli import main\nmain(prog_name='cylx')"
         command = [sys.executable, "-c", code, *(str(arg) for arg in args)]
-        return subprocess.run(command, capture_output=True, check=False, timeout=120, **settings)
+        return subprocess.run(command, capture_output=True, check=False, timeout=PATIENCE, **settings)
 
     return spawn
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import pytest
 import yaml
 
+from tests.support.patience import PATIENCE
 from tests.support.texts import same
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -117,7 +118,7 @@ def bash(clone, tmp_path):
         text = "\n".join(map(without_installing, text.splitlines()))
         command = ["bash", "-euo", "pipefail", "-c", text]
         done = subprocess.run(
-            command, cwd=clone, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=120, check=False
+            command, cwd=clone, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE, check=False
         )
         assert done.returncode == 0, f"{text}\n{done.stdout.decode()}"
         return done.stdout.decode()

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from cylx import synthetic
 from cylx.io import write_cloud
+from tests.support.patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 SIGNALS = ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT")
@@ -27,7 +28,6 @@ WAYS = {
     "batch --jobs 2": [*BATCH, "--jobs", "2"],
 }
 QUIET_END = {"SIGKILL": -9, "SIGTERM": -15, "SIGHUP": -1, "SIGINT": 130}
-TOO_LONG = 300
 
 
 class Bench:
@@ -64,7 +64,7 @@ class Bench:
 
     def run(self, way, out, *options):
         process = self.start(way, out, *options)
-        _, said = process.communicate(timeout=TOO_LONG)
+        _, said = process.communicate(timeout=PATIENCE)
         process.said = said.decode()
         return process
 
@@ -73,7 +73,7 @@ class Bench:
         process = self.start(way, out)
         time.sleep(after)
         os.killpg(process.pid, getattr(signal, name))
-        _, said = process.communicate(timeout=TOO_LONG)
+        _, said = process.communicate(timeout=PATIENCE)
         wrong = self.faults_of_killed(name, way, out, process.returncode, said.decode())
         resumed = self.run(way, out, "--resume")
         if resumed.returncode != 0 or contents(self.folder / out) != self.whole[way]:
@@ -99,7 +99,7 @@ class Bench:
         """Start two runs on one output; exactly one may succeed."""
         (self.folder / out).mkdir()
         both = [self.start("single", out) for _ in range(2)]
-        said = [process.communicate(timeout=TOO_LONG)[1].decode() for process in both]
+        said = [process.communicate(timeout=PATIENCE)[1].decode() for process in both]
         codes = sorted(process.returncode for process in both)
         whole = contents(self.folder / out) == self.whole["single"]
         return [] if codes == [0, 4] and whole else [f"exit codes {codes}, whole: {whole}: {said}"]

@@ -161,7 +161,7 @@ def test_absurd_shapes_are_refused_at_once(tmp_path, plain, parts, message):
     started = time.process_time()
     with pytest.raises(InputError) as refused, open_input(tmp_path / "scan.e57") as source:
         check_xml(source)
-    assert time.process_time() - started < 1
+    assert time.process_time() - started < 10  # libE57 takes a minute or more
     assert str(refused.value).startswith(f"{tmp_path / 'scan.e57'}: {message}")
 
 
