@@ -13,12 +13,14 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 import yaml
 
+from tests.support import warm
 from tests.support.patience import PATIENCE
 from tests.support.texts import same
 
@@ -103,13 +105,23 @@ def clone(tmp_path):
     return tmp_path / "clone"
 
 
+@pytest.fixture(scope="module")
+def cylx():
+    """The text of the command `cylx` of this checkout, which is warm already where that is possible."""
+    if not warm.POSSIBLE:
+        yield f'#!/bin/sh\nexec "{sys.executable}" -m cylx "$@"\n'
+        return
+    with tempfile.TemporaryDirectory() as folder, warm.serving(Path(folder) / "s"):  # such names must be short
+        yield warm.calls(Path(folder) / "s")
+
+
 @pytest.fixture
-def bash(clone, tmp_path):
+def bash(clone, tmp_path, cylx):
     """Run a text by bash in the clone, with `cylx` and `python` of this checkout; gives both its streams."""
     tools = tmp_path / "tools"
     tools.mkdir()
-    for name, command in (("cylx", f'"{sys.executable}" -m cylx'), ("python", f'"{sys.executable}"')):
-        (tools / name).write_text(f'#!/bin/sh\nexec {command} "$@"\n', encoding="utf-8")
+    for name, text in (("cylx", cylx), ("python", f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')):
+        (tools / name).write_text(text, encoding="utf-8")
         (tools / name).chmod(0o755)
     path = os.pathsep.join([str(tools), os.environ["PATH"]])
     env = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
