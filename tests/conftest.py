@@ -65,6 +65,28 @@ def _kept_readers():
     readers.close()
 
 
+@pytest.fixture(scope="session")
+def kept_extractions(tmp_path_factory):
+    """A folder for what extractions gave, the same for all workers of this run."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "extractions"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def extract_file(kept_extractions):
+    """Extract a file by default settings, once for all tests that want its cylinders."""
+    from cylx.config import Config
+    from cylx.io import read_cloud
+    from cylx.pipeline import extract_cylinders
+    from cylx.records import SilentObserver
+    from tests.support.warm import remembered
+
+    extract_once = remembered(extract_cylinders, kept_extractions)
+    return lambda path: extract_once(read_cloud(path), Config(), observer=SilentObserver())
+
+
 @pytest.fixture
 def run_cylx():
     """Run the command line in this process: `run_cylx("info", path)` gives exit_code, stdout and stderr."""

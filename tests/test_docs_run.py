@@ -20,6 +20,7 @@ from typing import NamedTuple
 import pytest
 import yaml
 
+from cylx.pipeline import extract_cylinders
 from tests.support import warm
 from tests.support.patience import PATIENCE
 from tests.support.texts import same
@@ -106,12 +107,15 @@ def clone(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def cylx():
+def cylx(kept_extractions):
     """The text of the command `cylx` of this checkout, which is warm already where that is possible."""
     if not warm.POSSIBLE:
         yield f'#!/bin/sh\nexec "{sys.executable}" -m cylx "$@"\n'
         return
-    with tempfile.TemporaryDirectory() as folder, warm.serving(Path(folder) / "s"):  # such names must be short
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        warm.serving(Path(folder) / "s", kept_extractions),
+    ):  # such names must be short
         yield warm.calls(Path(folder) / "s")
 
 
@@ -140,8 +144,10 @@ def bash(clone, tmp_path, cylx):
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="the pages are written for bash, which is not here")
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_the_code_blocks_run_and_give_what_is_shown(path, bash, clone, monkeypatch, request):
+def test_the_code_blocks_run_and_give_what_is_shown(path, bash, clone, monkeypatch, request, kept_extractions):
     monkeypatch.chdir(clone)
+    for name in ("cylx.api.extract_cylinders", "cylx.pipeline.extract_cylinders"):
+        monkeypatch.setattr(name, warm.remembered(extract_cylinders, kept_extractions))
     page = path.read_text(encoding="utf-8")
     output, names, stale = None, {"__name__": "page"}, []
     for block in blocks_of(page):

@@ -33,14 +33,14 @@ QUIET_END = {"SIGKILL": -9, "SIGTERM": -15, "SIGHUP": -1, "SIGINT": 130}
 class Bench:
     """A folder with scans, and what comes out of them."""
 
-    def __init__(self, folder, scans=3):
+    def __init__(self, folder, ways=tuple(WAYS), *, scans=3, points=1500):
         self.folder = folder
         (folder / "scans").mkdir()
         for seed in range(scans):
-            write_cloud(folder / "scans" / f"{seed}.ply", synthetic.single(points=1500, seed=seed).points)
+            write_cloud(folder / "scans" / f"{seed}.ply", synthetic.single(points=points, seed=seed).points)
         self.whole, self.seconds = {}, {}
-        for way in WAYS:
-            self.run(way, f"warm {way}")
+        self.run(ways[0], "warm")
+        for way in ways:
             started = time.monotonic()
             assert self.run(way, f"whole {way}").returncode == 0
             self.seconds[way] = time.monotonic() - started
@@ -113,13 +113,13 @@ def hidden(folder):
     return [name for name in contents(folder) if name.startswith(".")]
 
 
-def torture(kills, pairs, seed, show=print):
-    """Kill so many runs, and start so many pairs; give the faults."""
+def torture(kills, pairs, seed, show=print, **scans):
+    """Kill so many runs, and start so many pairs; give the faults. `scans` are the settings of the bench."""
     rng, faults, counts = random.Random(seed), [], Counter()
     with tempfile.TemporaryDirectory(prefix="cylx-kills-") as place:
-        bench = Bench(Path(place))
+        bench = Bench(Path(place), **scans)
         for index in range(kills):
-            way, name = list(WAYS)[index % len(WAYS)], SIGNALS[index // len(WAYS) % len(SIGNALS)]
+            way, name = list(WAYS)[index % len(WAYS)], SIGNALS[index % len(SIGNALS)]
             after = bench.seconds[way] * rng.uniform(0.15, 1.05)
             wrong = bench.kill_one(name, way, after, f"out{index}")
             counts[way, name, bool(wrong)] += 1

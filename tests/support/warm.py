@@ -2,7 +2,7 @@
 
 What an extraction gives is remembered, too: pages and tests about commands extract the same scans again and again.
 
-`python -m tests.support.warm SOCKET` serves. `calls(SOCKET)` is the text of a command that passes its arguments,
+`python -m tests.support.warm SOCKET FOLDER` serves. `calls(SOCKET)` is the text of a command that passes its arguments,
 folder, environment and streams on, and ends as the process does that runs cylx for it.
 """
 
@@ -41,9 +41,9 @@ def calls(path):
 
 
 @contextlib.contextmanager
-def serving(path):
-    """Start the process, wait until it is ready, and stop it at the end."""
-    command = [sys.executable, "-m", "tests.support.warm", str(path)]
+def serving(path, folder):
+    """Start the process, which remembers extractions in a folder; wait until it is ready, and stop it at the end."""
+    command = [sys.executable, "-m", "tests.support.warm", str(path), str(folder)]
     with subprocess.Popen(command, cwd=Path(__file__).resolve().parents[2], stdout=subprocess.PIPE) as process:
         assert process.stdout.readline() == b"ready\n"
         try:
@@ -103,8 +103,10 @@ class Recorder:
 
 def remembered(extract, folder):
     """Return a function that keeps what an extraction gives, as the same points and settings give the same."""
+    from cylx.records import SilentObserver
 
     def extract_once(cloud, config, *, threads=None, observer=None):
+        observer = observer or SilentObserver()
         valid = b"" if cloud.valid is None else cloud.valid.tobytes()
         about = f"{cloud.source!r} {cloud.rows} {config.model_dump_json()}".encode()
         path = folder / hashlib.sha256(b"|".join([cloud.points.tobytes(), valid, about])).hexdigest()
@@ -141,8 +143,9 @@ def load(folder):
 
 
 if __name__ == "__main__":
-    load(Path(sys.argv[1]).parent)
-    serve(sys.argv[1])
+    path, folder = sys.argv[1:]
+    load(Path(folder))
+    serve(path)
     from cylx.__main__ import run
 
     run()
