@@ -9,13 +9,20 @@ from cylx.api import extract
 from cylx.io import read_cloud
 from cylx.records import PointCloud, Scene
 from cylx.scene import measure_scene
-from cylx.scene.cautions import COORDINATES_SAMPLED, cautions, damage, step_of
+from cylx.scene.cautions import cautions, damage, step_of
 from cylx.synthetic import multi, single
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 PIPES = read_cloud(SAMPLES / "pipes.ply").points
 NOISE = 0.002
+SAMPLED = 20_000
+"""Points of a cloud that are looked at for steps and copies; fewer than otherwise, to be quick."""
 MAP = np.array([5e5, 5e6, 100.0])
+
+
+@pytest.fixture(autouse=True)
+def _fewer_points_are_looked_at(monkeypatch):
+    monkeypatch.setattr("cylx.scene.cautions.COORDINATES_SAMPLED", SAMPLED)
 
 
 def said(points):
@@ -59,7 +66,7 @@ def bad_clouds(pipes):
         "single precision that leaves nothing": ((pipes + 5e6).astype(np.float32), {"precision"}),
         "all points twice": (np.vstack([pipes, pipes]), {"copies"}),
         "a cloud too large to look at whole": (
-            np.repeat(random(COORDINATES_SAMPLED, 3), 3, axis=0),
+            np.repeat(random(SAMPLED, 3), 3, axis=0),
             {"copies", "noise"},
         ),
         "noise above the spacing": (PIPES + 10 * NOISE * random(*PIPES.shape), {"noise"}),
