@@ -70,6 +70,10 @@ class OutputError(CylxError):
     exit_code = 4
 
 
+class ExistsError(OutputError):
+    """An output that exists and may not be replaced, perhaps since another program was faster."""
+
+
 class NothingFoundError(CylxError):
     """Fewer cylinders than `--require` asks for."""
 

@@ -10,6 +10,8 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import settings
 
+from tests.support.patience import PATIENCE
+
 # the examples are the same in every run; `pytest --hypothesis-profile search` looks for others, and for longer
 settings.register_profile("same", derandomize=True, deadline=None)
 settings.register_profile("search", max_examples=1000, deadline=None)
@@ -63,6 +65,28 @@ def _kept_readers():
     readers.close()
 
 
+@pytest.fixture(scope="session")
+def kept_extractions(tmp_path_factory):
+    """A folder for what extractions gave, the same for all workers of this run."""
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "extractions"
+    folder.mkdir(exist_ok=True)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def extract_file(kept_extractions):
+    """Extract a file by default settings, once for all tests that want its cylinders."""
+    from cylx.config import Config
+    from cylx.io import read_cloud
+    from cylx.pipeline import extract_cylinders
+    from cylx.records import SilentObserver
+    from tests.support.warm import remembered
+
+    extract_once = remembered(extract_cylinders, kept_extractions)
+    return lambda path: extract_once(read_cloud(path), Config(), observer=SilentObserver())
+
+
 @pytest.fixture
 def run_cylx():
     """Run the command line in this process: `run_cylx("info", path)` gives exit_code, stdout and stderr."""
@@ -83,7 +107,7 @@ def spawn_cylx():
     def spawn(*args, prelude="", **settings):
         code = f"{prelude}\nfrom cylx.cli import main\nmain(prog_name='cylx')"
         command = [sys.executable, "-c", code, *(str(arg) for arg in args)]
-        return subprocess.run(command, capture_output=True, check=False, timeout=120, **settings)
+        return subprocess.run(command, capture_output=True, check=False, timeout=PATIENCE, **settings)
 
     return spawn
 

@@ -13,12 +13,16 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 import yaml
 
+from cylx.pipeline import extract_cylinders
+from tests.support import warm
+from tests.support.patience import PATIENCE
 from tests.support.texts import same
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -102,13 +106,26 @@ def clone(tmp_path):
     return tmp_path / "clone"
 
 
+@pytest.fixture(scope="module")
+def cylx(kept_extractions):
+    """The text of the command `cylx` of this checkout, which is warm already where that is possible."""
+    if not warm.POSSIBLE:
+        yield f'#!/bin/sh\nexec "{sys.executable}" -m cylx "$@"\n'
+        return
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        warm.serving(Path(folder) / "s", kept_extractions),
+    ):  # such names must be short
+        yield warm.calls(Path(folder) / "s")
+
+
 @pytest.fixture
-def bash(clone, tmp_path):
+def bash(clone, tmp_path, cylx):
     """Run a text by bash in the clone, with `cylx` and `python` of this checkout; gives both its streams."""
     tools = tmp_path / "tools"
     tools.mkdir()
-    for name, command in (("cylx", f'"{sys.executable}" -m cylx'), ("python", f'"{sys.executable}"')):
-        (tools / name).write_text(f'#!/bin/sh\nexec {command} "$@"\n', encoding="utf-8")
+    for name, text in (("cylx", cylx), ("python", f'#!/bin/sh\nexec "{sys.executable}" "$@"\n')):
+        (tools / name).write_text(text, encoding="utf-8")
         (tools / name).chmod(0o755)
     path = os.pathsep.join([str(tools), os.environ["PATH"]])
     env = {**os.environ, "PATH": path, "PYTHONPATH": str(ROOT), "NO_COLOR": "1", "PYTHONIOENCODING": "utf-8"}
@@ -117,7 +134,7 @@ def bash(clone, tmp_path):
         text = "\n".join(map(without_installing, text.splitlines()))
         command = ["bash", "-euo", "pipefail", "-c", text]
         done = subprocess.run(
-            command, cwd=clone, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=120, check=False
+            command, cwd=clone, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=PATIENCE, check=False
         )
         assert done.returncode == 0, f"{text}\n{done.stdout.decode()}"
         return done.stdout.decode()
@@ -127,8 +144,10 @@ def bash(clone, tmp_path):
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="the pages are written for bash, which is not here")
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_the_code_blocks_run_and_give_what_is_shown(path, bash, clone, monkeypatch, request):
+def test_the_code_blocks_run_and_give_what_is_shown(path, bash, clone, monkeypatch, request, kept_extractions):
     monkeypatch.chdir(clone)
+    for name in ("cylx.api.extract_cylinders", "cylx.pipeline.extract_cylinders"):
+        monkeypatch.setattr(name, warm.remembered(extract_cylinders, kept_extractions))
     page = path.read_text(encoding="utf-8")
     output, names, stale = None, {"__name__": "page"}, []
     for block in blocks_of(page):

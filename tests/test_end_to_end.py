@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from plyfile import PlyData
 
+from cylx.io import write_cloud
 from cylx.results import result_schema
+from cylx.synthetic import single
 
 STAGES = ["reading", "scene", "curvature", "slicing", "candidates", "clustering", "averaging", "labelling", "writing"]
 INTERRUPT = """
@@ -91,10 +93,12 @@ def test_the_paper_runs_too(run_cylx, tmp_path):
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
 @pytest.mark.parametrize("stage", STAGES)
-def test_an_interrupt_in_any_stage_leaves_nothing_behind(spawn_cylx, scan, stage):
+def test_an_interrupt_in_any_stage_leaves_nothing_behind(spawn_cylx, tmp_path, stage):
+    scan = tmp_path / "can.ply"
+    write_cloud(scan, single(points=1000).points)
     stopped = spawn_cylx("extract", scan, prelude=INTERRUPT.format(stage=stage))
     assert (stopped.returncode, stopped.stdout, stopped.stderr) == (130, b"", b"cylx: interrupted\n")
-    assert [path.name for path in scan.parent.iterdir()] == ["room.ply"]
+    assert [path.name for path in scan.parent.iterdir()] == ["can.ply"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no broken pipes")

@@ -11,6 +11,7 @@ from cylx.errors import InputError
 from tests.fuzz.mutate import mutate
 from tests.fuzz.run import all_targets, fuzz, judge
 from tests.fuzz.targets import TARGETS
+from tests.support.patience import PATIENCE
 
 INPUTS = 60
 """Mutated inputs of each target, besides its seeds."""
@@ -65,7 +66,7 @@ def test_every_target_has_small_seeds():
 def test_the_command_prints_a_table():
     root = Path(__file__).resolve().parents[1]
     command = [sys.executable, "-m", "tests.fuzz.run", "--target", "override", "--inputs", "20"]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False, timeout=PATIENCE)
     assert done.returncode == 0, done.stderr
     header, row, total = done.stdout.splitlines()
     assert header.split() == ["target", "inputs", "successes", "errors", "defects"]

@@ -49,9 +49,48 @@ def test_the_page_tells_of_every_script():
     ]
 
 
+def check_desk_objects(names, printed):
+    assert len(names["found"].cylinders) == 3
+    for fit in names["found"].cylinders:
+        true = min(
+            (one.shape.radius for one in names["cylinders"].values()), key=lambda r: abs(r - fit.cylinder.radius)
+        )
+        assert abs(fit.cylinder.radius - true) < 4 * fit.radius_sd
+
+
+def check_pipe_rack(names, printed):
+    found = names["found"]
+    assert all(fit.nominal.decision == "snapped" for fit in found.cylinders)
+    for pipe, name in zip(names["pipes"], names["names"], strict=True):
+        near = min(found.cylinders, key=lambda fit: np.linalg.norm(fit.cylinder.point[1:] - pipe.shape.point[1:]))
+        assert near.nominal.name == name
+    hit = found.cylinders[names["dented"]].cylinder
+    assert np.linalg.norm(hit.point[1:] - names["pipes"][1].shape.point[1:]) < 2.0
+    assert names["deepest"] < 2 * names["usual"] < 0
+
+
+def check_tree_stems(names, printed):
+    deviations = [fit.radius_sd for fit in names["found"].cylinders]
+    assert names["matched"].sum() == names["STEMS"] == len(deviations)
+    assert (np.abs(names["errors"]) < 2 * np.array(deviations)).mean() >= 0.8
+
+
+def check_ci_regression(names, printed):
+    assert printed.startswith("same of 6 cylinders\n")
+    kinds = {(one.kind, one.id_a) for one in names["outcome"].differences}
+    assert kinds == {("resized", 2), ("missing", 5)}
+
+
+CHECKS = {
+    check.__name__.removeprefix("check_"): check
+    for check in (check_desk_objects, check_pipe_rack, check_tree_stems, check_ci_regression)
+}
+
+
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: path.stem)
-def test_a_script_prints_and_draws_what_the_page_shows(path, play, tmp_path, request):
-    _, printed = play(path.stem)
+def test_a_script_finds_prints_and_draws_what_the_page_shows(path, play, tmp_path, request):
+    names, printed = play(path.stem)
+    CHECKS[path.stem](names, printed)
     (drawn,) = tmp_path.glob("*.png")
     shown = ROOT / "docs" / "pictures" / f"gallery-{path.stem.replace('_', '-')}.png"
     page = PAGE.read_text(encoding="utf-8")
@@ -80,42 +119,6 @@ def test_a_script_opens_as_a_notebook(path):
         assert kind in ("", " [markdown]")
         if kind:
             assert all(line.startswith("#") for line in body.splitlines() if line)
-
-
-def test_only_the_cylinders_of_the_desk_are_found(play):
-    names, _ = play("desk_objects")
-    assert len(names["found"].cylinders) == 3
-    for fit in names["found"].cylinders:
-        true = min(
-            (one.shape.radius for one in names["cylinders"].values()), key=lambda r: abs(r - fit.cylinder.radius)
-        )
-        assert abs(fit.cylinder.radius - true) < 4 * fit.radius_sd
-
-
-def test_the_pipes_have_their_names_and_the_dent_is_where_it_was_made(play):
-    names, _ = play("pipe_rack")
-    found = names["found"]
-    assert all(fit.nominal.decision == "snapped" for fit in found.cylinders)
-    for pipe, name in zip(names["pipes"], names["names"], strict=True):
-        near = min(found.cylinders, key=lambda fit: np.linalg.norm(fit.cylinder.point[1:] - pipe.shape.point[1:]))
-        assert near.nominal.name == name
-    hit = found.cylinders[names["dented"]].cylinder
-    assert np.linalg.norm(hit.point[1:] - names["pipes"][1].shape.point[1:]) < 2.0
-    assert names["deepest"] < 2 * names["usual"] < 0
-
-
-def test_the_bars_hold_most_stems(play):
-    names, _ = play("tree_stems")
-    deviations = [fit.radius_sd for fit in names["found"].cylinders]
-    assert names["matched"].sum() == names["STEMS"] == len(deviations)
-    assert (np.abs(names["errors"]) < 2 * np.array(deviations)).mean() >= 0.8
-
-
-def test_a_change_is_named_and_none_is_not(play):
-    names, printed = play("ci_regression")
-    assert printed.startswith("same of 6 cylinders\n")
-    kinds = {(one.kind, one.id_a) for one in names["outcome"].differences}
-    assert kinds == {("resized", 2), ("missing", 5)}
 
 
 def test_without_matplotlib_an_example_says_what_to_install(play, monkeypatch):

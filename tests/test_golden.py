@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cylx.api import extract
 from cylx.cli import main
 from cylx.evaluation import compare, evaluate
 from cylx.io import read_cloud
@@ -40,8 +39,8 @@ def sample(request):
 
 
 @pytest.fixture(scope="module")
-def found(sample, request):
-    text = Result.of(extract(SAMPLE_DATA / sample)).to_json()
+def found(sample, request, extract_file):
+    text = Result.of(extract_file(SAMPLE_DATA / sample)).to_json()
     if request.config.getoption("--regen"):
         golden_of(sample).write_text(text, encoding="utf-8", newline="\n")
     return json.loads(text)

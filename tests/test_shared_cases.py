@@ -45,7 +45,7 @@ READ = {
         "bom.ply", "space.ply", "crlf.ply", "cr.ply", "nonascii.ply", "objinfo.ply", "long.ply", "ulong.ply",
         "bool.ply", "facefirst.ply", "facefirsta.ply", "big.ply", "tail.ply", "taila.ply", "nofinalnl.ply",
         "blank.ply", "nan.ply", "Nan2.ply", "comma.ply", "headersp.ply", "vlist.ply", "xyzcaps.ply", "bomdata.ply",
-        "headersp2.ply",
+        "headersp2.ply", "upper.ply", "vertices.ply", "point.ply",
     ],
 }  # fmt: skip
 REFUSED = {
@@ -54,10 +54,7 @@ REFUSED = {
     "las-quirks/trunc.laz": f": the table of its compressed chunks is damaged; {COPY}",
     "las-quirks/nanscale.las": ": the scale of x is nan; export the file again",
     "las-quirks/zeroscale.las": ": the scale of x is 0; export the file again",
-    "ply-quirks/upper.ply": ": is not PLY: it does not begin with the line 'ply'; give it its right suffix",
     "ply-quirks/leadnl.ply": ": is not PLY: it does not begin with the line 'ply'; give it its right suffix",
-    "ply-quirks/vertices.ply": ": the PLY header has no vertex element; give a PLY with points",
-    "ply-quirks/point.ply": ": the PLY header has no vertex element; give a PLY with points",
     "ply-quirks/floatcol.ply": f":11: red is '255.0', not a number of type uint8; {NUMBERS}",
     "ply-quirks/negcol.ply": f":9: red is '256', not a number of type uint8; {NUMBERS}",
     "ply-quirks/moretok.ply": ":8: expected 3 columns, found 4; give every row the same columns",

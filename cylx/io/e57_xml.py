@@ -1,7 +1,7 @@
 """The XML of an E57 file, checked before libE57 parses it.
 
 Its parser opens the files and addresses that the XML names, in a DOCTYPE or as the place of a schema, and expands
-entities without end. An E57 file needs none of them.
+entities without end. Deep elements, and elements of many parts, cost it minutes. An E57 file needs none of them.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import struct
 from typing import TYPE_CHECKING
+from xml.parsers import expat
 
 from cylx.errors import InputError
 
@@ -17,18 +18,23 @@ if TYPE_CHECKING:
 
 _PAGE, _PAYLOAD = 1024, 1020  # bytes of a page, the last four of which are a checksum
 _HEADER = 48
+_DECLARATION = re.compile(rb"[ \t\r\n]*<\?xml[ \t\r\n]")
 _ENCODING = re.compile(rb"\bencoding\s*=\s*[\"']([^\"']*)[\"']")
 _ENCODINGS = ("utf-8", "utf8", "us-ascii", "ascii", "iso-8859-1")  # a byte of ASCII means the same in each
 _APART = {b"<?": b"?>", b"<!--": b"-->", b"<![CDATA[": b"]]>"}
 _OPENING = re.compile(rb"<\?|<!--|<!\[CDATA\[")
 _DTD = re.compile(rb"<!\s*(?:DOCTYPE|ENTITY|ELEMENT|ATTLIST|NOTATION)", re.IGNORECASE)
 _SCHEMA = re.compile(rb"schemaLocation\s*=", re.IGNORECASE)
+_DEEPEST = 100
+"""Elements within one another: the standard has about ten."""
+_MOST_PARTS = 1 << 12
+"""Parts of an element with names of their own: libE57 compares each with all before it."""
 _REMEDY = "get a complete copy of the file"
 _MISTRUST = "do not trust the file; export it again with other software"
 
 
 def check_xml(source: Input) -> None:
-    """Refuse XML that has a DOCTYPE or an entity, names a schema, or is written in bytes that could hide them.
+    """Refuse XML that has a DOCTYPE or an entity, names a schema, is nested deeply, or is in bytes that could hide it.
 
     Parameters
     ----------
@@ -40,13 +46,46 @@ def check_xml(source: Input) -> None:
     InputError
     """
     xml = _xml(source).removeprefix(b"\xef\xbb\xbf")
-    if xml.lstrip(b" \t\r\n")[:1] != b"<" or not _is_text(xml, _encoding(xml)):
+    encoding = _encoding(xml)
+    if xml.lstrip(b" \t\r\n")[:1] != b"<" or not _is_text(xml, encoding):
         raise InputError(source.place, "broken E57: its XML is no text in UTF-8", _REMEDY)
     markup = _without_comments(xml)
     if markup.lstrip()[:2] == b"<!" or _DTD.search(markup):
         raise InputError(source.place, "its XML has a DOCTYPE or an entity, which E57 does not use", _MISTRUST)
     if _SCHEMA.search(markup):
         raise InputError(source.place, "its XML names the place of a schema, which E57 does not use", _MISTRUST)
+    try:
+        _check_shape(xml, encoding)
+    except expat.ExpatError as error:
+        fault = f"broken E57: its XML is not well-formed, {error}"
+        raise InputError(source.place, fault, _REMEDY) from None
+    except _ExtremeError as error:
+        raise InputError(source.place, f"its XML has {error}, which E57 does not use", _MISTRUST) from None
+
+
+class _ExtremeError(Exception):
+    """Elements are nested too deeply, or one has too many parts."""
+
+
+def _check_shape(xml: bytes, encoding: str) -> None:
+    """Parse the XML by a parser that neither opens anything nor calls itself, and stop where it is too deep or wide."""
+    open_elements: list[list[int]] = []  # for each, how many parts it may still have
+
+    def down(_name: str, attributes: dict[str, str]) -> None:
+        if open_elements:
+            open_elements[-1][0] -= 1
+            if open_elements[-1][0] < 0:
+                raise _ExtremeError(f"an element of more than {_MOST_PARTS} parts")
+        if len(open_elements) == _DEEPEST:
+            raise _ExtremeError(f"more than {_DEEPEST} elements within one another")
+        open_elements.append([len(xml) if attributes.get("type") == "Vector" else _MOST_PARTS])
+
+    def up(_name: str) -> None:
+        open_elements.pop()
+
+    parser = expat.ParserCreate("utf-8" if encoding == "utf8" else encoding)
+    parser.StartElementHandler, parser.EndElementHandler = down, up
+    parser.Parse(xml.lstrip(b" \t\r\n"), True)
 
 
 def _xml(source: Input) -> bytes:
@@ -69,7 +108,7 @@ def _xml(source: Input) -> bytes:
 
 def _encoding(xml: bytes) -> str:
     """Return the encoding that the XML declares; an empty text if it may not be used, or cannot be told for certain."""
-    declaration = xml[: xml.find(b"?>")] if xml.lstrip(b" \t\r\n").startswith(b"<?xml") else b""
+    declaration = xml[: xml.find(b"?>")] if _DECLARATION.match(xml) else b""
     found = [name.strip().lower().decode("ascii", "replace") for name in _ENCODING.findall(declaration)]
     if declaration.lower().count(b"encoding") != len(found) or any(name not in _ENCODINGS for name in found):
         return ""

@@ -28,7 +28,7 @@ _BEGINNINGS = {
     b"ASTM-E57": "e57",
     b"\x93NUMPY": "npy",
     _ZIP: "npy",
-    **dict.fromkeys((b"ply\n", b"ply\r", b"ply "), "ply"),
+    **dict.fromkeys((b"ply\n", b"ply\r", b"ply ", b"PLY\n", b"PLY\r"), "ply"),
     **dict.fromkeys((b"# .PCD", b"#.PCD", b"# .pcd", b"VERSION", b"FIELDS", b"version 0.", b"version ."), "pcd"),
 }
 _HEAD = 1024

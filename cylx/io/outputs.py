@@ -11,12 +11,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
-from cylx.errors import OutputError
+from cylx.errors import ExistsError, OutputError
 from cylx.io.inputs import printable
 from cylx.io.staging import Group, is_staged, known_name, staged
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
+
+    Writer = Callable[[str | Path], None]
 
 STREAM = "-"
 STANDARD_OUTPUT = (STREAM, "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
@@ -51,7 +53,7 @@ def check_writable(path: str | Path, *, overwrite: bool) -> None:
         raise OutputError(place, "is read-only", "choose another name, or change its permissions")
     elif stat.S_ISREG(mode):
         if not overwrite:
-            raise OutputError(place, "exists already", "choose another name, or give --overwrite")
+            raise ExistsError(place, "exists already", "choose another name, or give --overwrite")
         _check_folder(_target(path).parent, place)
 
 
@@ -158,10 +160,67 @@ def write_together(contents: Mapping[str, bytes], *, overwrite: bool) -> None:
             write_bytes(temporary(name), data, overwrite=overwrite)
 
 
+def write_beside(main: tuple[str, Writer], others: Mapping[str, Writer], *, overwrite: bool) -> dict[str, Exception]:
+    """Write a file and others beside it; it is kept, and so are they, if one of the others fails.
+
+    The main file is written first, so that the others cannot take its place on the disk, and takes its name last: once
+    it is there, so are they. An old file in the place of one that failed is removed, as it belongs to an older main
+    file.
+
+    Parameters
+    ----------
+    main : (str, callable)
+        Its name, and what writes it to a path.
+    others : mapping of str to callable
+        The same for the others.
+    overwrite : bool
+        Whether existing files may be replaced.
+
+    Returns
+    -------
+    dict of str to Exception
+        What went wrong with the others, by name.
+
+    Raises
+    ------
+    OutputError
+        If the main file cannot be written, or another program has written one of the files meanwhile: then there is
+        none.
+    """
+    group, failed = Group(), dict[str, Exception]()
+    name, write = main
+    try:
+        with _moved_at_the_end(name, group, overwrite=overwrite) as path:
+            write(path)
+            for other, write_other in others.items():
+                failure = _write_other(other, write_other, group, overwrite=overwrite)
+                if failure is not None:
+                    failed[other] = failure
+    except BaseException:
+        group.take_back()
+        raise
+    group.finish()
+    return failed
+
+
+def _write_other(name: str, write: Writer, group: Group, *, overwrite: bool) -> Exception | None:
+    """Write a file of a group; return what went wrong."""
+    try:
+        with _moved_at_the_end(name, group, overwrite=overwrite) as path:
+            write(path)
+    except ExistsError:
+        raise
+    except Exception as failure:  # noqa: BLE001  returned, so that the other files are kept
+        if overwrite and _may_be_replaced(name):
+            group.remove(_target(name))
+        return failure
+    return None
+
+
 @contextmanager
 def _moved_at_the_end(name: str, group: Group, *, overwrite: bool) -> Iterator[str | Path]:
     """Yield a temporary name beside an output, which takes its name if all goes well."""
-    if name == STREAM or not (Path(name).is_file() or not Path(name).exists() or _is_plain_link(name)):
+    if not _may_be_replaced(name):
         yield name
         return
     check_writable(name, overwrite=overwrite)
@@ -173,6 +232,11 @@ def _moved_at_the_end(name: str, group: Group, *, overwrite: bool) -> Iterator[s
         raise
     except OSError as error:
         _refuse_os_error(printable(name), error)
+
+
+def _may_be_replaced(name: str) -> bool:
+    """Return whether an output is a file, or is to become one, rather than a stream or a device."""
+    return name != STREAM and (Path(name).is_file() or not Path(name).exists() or _is_plain_link(name))
 
 
 def _target(path: str | Path) -> Path:

@@ -45,7 +45,9 @@ TYPES = {
 STANDARD = {"bool": "uchar"} | dict.fromkeys(("int64", "uint64", "long", "ulong", "longlong", "ulonglong"), "double")
 """Types of PLY with the size of those that it has not."""
 _MOST_PROPERTIES = 1 << 12
-_FIRST = re.compile(rb"ply[ \t]*(\r\n|\n|\r|\Z)")
+_VERTEX = ("vertex", "vertices", "point", "points")
+"""Names of the points, the standard one first."""
+_FIRST = re.compile(rb"ply[ \t]*(\r\n|\n|\r|\Z)", re.IGNORECASE)
 _BOM = b"\xef\xbb\xbf"
 _MOST_HEADER = 1 << 20
 _REMEDY = "export the file again as PLY 1.0"
@@ -134,6 +136,7 @@ def _read_lines(source: Input) -> Header:
     for number, size, line in _header_lines(source):  # noqa: B007  (both are needed after the last line)
         where = f"{source.place}:{number}"
         keyword, *rest = line.split() or [""]
+        keyword = keyword.lower()
         if keyword == "end_header":
             break
         if number == 1 or keyword in ("", "comment", "obj_info"):
@@ -148,10 +151,12 @@ def _read_lines(source: Input) -> Header:
             raise InputError(where, f"{excerpt(line)} is not a line of a PLY header", _REMEDY)
     if not kind:
         raise InputError(source.place, "the PLY header has no format line", _REMEDY)
-    names = [element.name for element in elements]
-    if "vertex" not in names:
+    names = [element.name.lower() for element in elements]
+    name = next((name for name in _VERTEX if name in names), "")
+    if not name:
         raise InputError(source.place, "the PLY header has no vertex element", "give a PLY with points")
-    return Header(kind, elements[: names.index("vertex") + 1], size, number)
+    before, vertex = elements[: names.index(name)], elements[names.index(name)]
+    return Header(kind, [*before, Element("vertex", vertex.count, vertex.properties)], size, number)
 
 
 def _header_lines(source: Input) -> Iterator[tuple[int, int, str]]:
@@ -174,10 +179,10 @@ def _header_lines(source: Input) -> Iterator[tuple[int, int, str]]:
 
 
 def _format(words: list[str], where: str) -> str:
-    if len(words) != 2 or words[0] not in _FORMATS or words[1] != "1.0":
+    if len(words) != 2 or words[0].lower() not in _FORMATS or words[1] != "1.0":
         fault = f"unknown format {excerpt(' '.join(words))}"
         raise InputError(where, fault, f"use one of {', '.join(_FORMATS)}, version 1.0")
-    return words[0]
+    return words[0].lower()
 
 
 def _element(words: list[str], where: str) -> Element:
@@ -189,12 +194,14 @@ def _element(words: list[str], where: str) -> Element:
 
 
 def _property(words: list[str], where: str) -> Property:
-    if len(words) == 3 and words[:2] in (["long", "long"], ["unsigned", "long"]):
-        words = [{"long": "longlong", "unsigned": "ulong"}[words[0]], words[2]]
-    if len(words) == 2 and words[0] in TYPES:
-        return Property(words[1], words[0])
-    if len(words) == 4 and words[0] == "list" and words[1] in TYPES and words[1] not in STANDARD and words[2] in TYPES:
-        return Property(words[3], words[2], words[1])
+    *types, name = [word.lower() for word in words[:-1]] + words[-1:] or [""]
+    if types in (["long", "long"], ["unsigned", "long"]):
+        types = [{"long": "longlong", "unsigned": "ulong"}[types[0]]]
+    if len(types) == 1 and types[0] in TYPES:
+        return Property(name, types[0])
+    listed = len(types) == 3 and types[0] == "list" and types[1] in TYPES and types[1] not in STANDARD
+    if listed and types[2] in TYPES:
+        return Property(name, types[2], types[1])
     raise InputError(where, f"{excerpt(' '.join(words))} is not a property type and name", _REMEDY)
 
 

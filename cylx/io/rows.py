@@ -233,7 +233,7 @@ def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: in
 def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]:
     """Yield the lines with one space between columns, up to the first wrong line, which raises."""
     yield from ("\n" for _ in range(rows.skip))
-    promised, found, marks = rows.promised, 0, ""
+    counts, found, marks = _Counts(rows.promised), 0, ""
     for number, line in enumerate(islice(lines, rows.skip, None), rows.line + rows.skip):
         where = f"{place}:{number}"
         if len(line) > LONGEST_LINE:
@@ -241,13 +241,9 @@ def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]
         columns = _row_of(line, rows)
         if not columns or (rows.header and line.strip() == rows.header):
             continue
-        if rows.loose and len(columns) == 1 < rows.width and is_count(columns[0]):
-            if found == (promised or 0):  # another block begins
-                promised = found + int(columns[0])
-                continue
-            if promised is None and int(columns[0]) == found:  # the count stands below the rows
-                promised = found
-                continue
+        bare = len(columns) == 1 < rows.width or (counts.expects(found) and not any(columns[1:]))
+        if rows.loose and bare and is_count(columns[0]) and counts.take(int(columns[0]), found, where):
+            continue
         if len(columns) != rows.width:
             fault = f"expected {rows.width} columns, found {len(columns)}"
             raise InputError(where, fault, "give every row the same columns")
@@ -258,8 +254,45 @@ def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]
         values = [plain_number(value) for value in values]
         yield " ".join(_filled(values, rows, where))
         found += 1
-    if promised is not None and promised != found:
-        raise wrong_count(place, promised, found)
+    counts.check(found, rows.width, place)
+
+
+class _Counts:
+    """The numbers of rows that lines of their own promise: above the rows, between blocks of them, or below.
+
+    Parameters
+    ----------
+    promised : int or None
+        The number in a line above the first row.
+    """
+
+    def __init__(self, promised: int | None) -> None:
+        self.promised = promised
+        self.below: int | None = None
+        self.doubtful = ""
+
+    def expects(self, found: int) -> bool:
+        """Return whether a block ends after this number of rows, so that another number may follow."""
+        return self.promised is not None and found in (self.promised, self.below)
+
+    def take(self, count: int, found: int, where: str) -> bool:
+        """Note a number that stands below `found` rows; return whether it may be a count."""
+        if self.promised is not None and not self.expects(found):
+            return False
+        if self.promised is None and found:  # the first number: of the rows above, or of those below
+            self.below = found if count == found else None
+            self.doubtful = where
+        self.promised = found + count
+        return True
+
+    def check(self, found: int, width: int, place: str) -> None:
+        """Refuse another number of rows than was promised; where that is doubtful, the line is what is wrong."""
+        if self.promised is None or self.expects(found):
+            return
+        if self.doubtful:
+            fault = f"expected {width} columns, found 1"
+            raise InputError(self.doubtful, fault, "give every row the same columns")
+        raise wrong_count(place, self.promised, found)
 
 
 def _row_of(line: str, rows: RowFormat) -> list[str]:

@@ -6,8 +6,9 @@ import re
 from pathlib import Path
 
 _HEAD = 1 << 16
+_BOM = b"\xef\xbb\xbf"
 _PROMISES = {
-    b"ply": re.compile(rb"[\r\n]element[ \t]+vertex[ \t]+(\d{1,18})\b"),
+    b"ply": re.compile(rb"[\r\n][ \t]*element[ \t]+(?:vertex|vertices|points?)[ \t]+(\d{1,18})\b", re.IGNORECASE),
     b"#": re.compile(rb"[\r\n]POINTS[ \t]+(\d{1,18})\b"),
     b"VERSION": re.compile(rb"[\r\n]POINTS[ \t]+(\d{1,18})\b"),
 }
@@ -48,7 +49,8 @@ def _promised(head: bytes) -> int | None:
     if head.startswith(b"LASF") and len(head) >= 255:
         long = int.from_bytes(head[247:255], "little") if head[25] >= 4 else 0
         return long or int.from_bytes(head[107:111], "little")
+    head = head.removeprefix(_BOM)
     for start, pattern in _PROMISES.items():
-        if head.startswith(start) and (found := pattern.search(head)):
+        if head[: len(start)].lower() == start.lower() and (found := pattern.search(head)):
             return int(found[1])
     return None

@@ -18,7 +18,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cylx.errors import OutputError
+from cylx.errors import ExistsError
 from cylx.io.inputs import printable
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ def staged(target: Path, name: str, suffix: str, *, overwrite: bool, group: Grou
 
     Raises
     ------
-    OutputError
+    ExistsError
         If the output has appeared meanwhile and may not be replaced.
     """
     _tidy(target.parent)
@@ -96,6 +96,13 @@ class Group:
     def made(self, target: Path) -> None:
         """Remember an output that replaced nothing."""
         self._done.append((target, None))
+
+    def remove(self, target: Path) -> None:
+        """Remove a file, and keep it for a while."""
+        old = temporary_beside(target, ".old")
+        with contextlib.suppress(OSError):  # it is not there, or may not be moved
+            target.replace(old)
+            self._done.append((target, old))
 
     def take_back(self) -> None:
         """Put the files back that were there before."""
@@ -171,7 +178,7 @@ def _publish(temporary: Path, target: Path, name: str, *, overwrite: bool, group
         _link(temporary, target)
     except FileExistsError:
         fault = "exists already, written by another program in the meantime"
-        raise OutputError(printable(name), fault, "choose another name, or give --overwrite") from None
+        raise ExistsError(printable(name), fault, "choose another name, or give --overwrite") from None
     if group is not None:
         group.made(target)
 

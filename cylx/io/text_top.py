@@ -31,7 +31,7 @@ _SAMPLE = 100
 _MOST_COLUMNS = 1000
 _AROUND = "\"',; "
 """What may stand around a name."""
-_COUNTED = (["points"], ["pts"], ["rows"])
+_COUNTED: tuple[list[str], ...] = ([], ["points"], ["pts"], ["rows"])
 """What may stand behind a count."""
 _PTX = [3, 3, 3, 3, 4, 4, 4, 4]
 """Numbers in the lines below the two counts of a PTX file: the scanner's place and axes, and a matrix."""
@@ -93,9 +93,11 @@ def read_top(lines: io.TextIOBase, place: str) -> Top:
         delimiter = delimiter_of(line.row)
         columns = _cells(line.row, delimiter, header)
         numbers = sum(_is_value(column) for column in columns)
-        if is_count(columns[0]) and (len(columns) == 1 or [word.lower() for word in columns[1:]] in _COUNTED):
+        counted = is_count(columns[0]) and [word.lower() for word in columns[1:] if word] in _COUNTED
+        if counted and not _is_row_with_gaps(header, columns, delimiter):
             if count is not None:
                 _refuse_ptx(sample[index + 1 :], place)
+            if count:
                 wrong = line
                 break
             count = int(columns[0])

@@ -10,7 +10,6 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.kernels import njit
 from cylx.geometry.morton import gather_ball
-from cylx.geometry.numerics import sort_in_place
 
 
 @njit(cache=True, nogil=True)
@@ -25,7 +24,7 @@ def _balls(
     radius: FloatArray,
 ) -> None:
     room = np.empty(len(points) if len(points) < 20000 else 20000, np.int64)
-    squares, ordered = np.empty(len(points)), np.empty(len(points))
+    squares, ordered = np.empty(len(points)), np.empty(size + 1)
     for s in range(len(sample)):
         center = points[sample[s]]
         reach, found = side, room
@@ -43,8 +42,16 @@ def _balls(
             squares[a] = (
                 (points[i, 0] - center[0]) ** 2 + (points[i, 1] - center[1]) ** 2 + (points[i, 2] - center[2]) ** 2
             )
-            ordered[a] = squares[a]
-        sort_in_place(ordered, n)
+        kept = 0
+        for a in range(n):  # the smallest in order: far too many are gathered where strays make the cells too large
+            if kept > size and squares[a] >= ordered[size]:
+                continue
+            j = min(kept, size)
+            while j > 0 and ordered[j - 1] > squares[a]:
+                ordered[j] = ordered[j - 1]
+                j -= 1
+            ordered[j] = squares[a]
+            kept = min(kept + 1, size + 1)
         k = 0
         for strictly in (True, False):  # of points equally far, those that come first
             for a in range(n):

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 
 from cylx.api import warmup
+from tests.support.patience import PATIENCE
 
 
 def test_the_end_of_the_method_is_practised_whole(monkeypatch):
@@ -25,7 +26,7 @@ def test_the_other_process_ends_with_the_practice(monkeypatch):
     popen = subprocess.Popen
 
     def start(command, **options):
-        started.append(popen([sys.executable, "-c", "import time; time.sleep(60)"], **options))
+        started.append(popen([sys.executable, "-c", "import time; time.sleep(6000)"], **options))
         return started[0]
 
     monkeypatch.setattr(subprocess, "Popen", start)
@@ -39,7 +40,7 @@ def test_the_other_process_does_what_it_should():
         [sys.executable, "-c", f"from {warmup.__name__} import practise_the_end; practise_the_end()"],
         capture_output=True,
         check=False,
-        timeout=120,
+        timeout=PATIENCE,
     )
     assert (process.returncode, process.stdout, process.stderr) == (0, b"", b"")
 

@@ -15,6 +15,7 @@ from cylx.cli.options.configuration import METHODS
 from cylx.cli.terminal.display import Messages
 from cylx.config import load_config
 from cylx.errors import InputError, OutputError, UsageError
+from cylx.io.staging import known_name
 from cylx.results import rejections_schema, result_schema
 from cylx.synthetic import single
 from tests.support.terminals import on_a_terminal
@@ -230,21 +231,63 @@ def test_overwrite_replaces_it(run_cylx, scan):
     assert json.loads(scan.with_name("scan.cylinders.json").read_bytes())["schema"] == "cylx.cylinders/1"
 
 
-@pytest.mark.parametrize("broken", [("write_text", 1), ("write_text", 2), ("write_annotated", 1)])
-def test_all_files_are_written_or_none(run_cylx, scan, monkeypatch, broken):
-    name, last = broken
-    write, calls = getattr(cylx.io, name), []
+JSON, ANNOTATED, REJECTED = "scan.cylinders.json", "scan.annotated.ply", "no.json"
+REFUSED = OutputError("it", "cannot be written: no space left on device", "free some space")
 
-    def refuse(path, *args, **settings):
-        calls.append(path)
-        if len(calls) == last:
-            raise OutputError(str(path), "cannot be written: no space left on device", "free some space")
-        write(path, *args, **settings)
 
-    monkeypatch.setattr(f"cylx.io.{name}", refuse)
-    assert run_cylx("extract", scan, "--rejected", scan.with_name("no.json")).exit_code == 4
-    assert len(calls) == last
-    assert names(scan.parent) == ["scan.xyz"]
+@pytest.mark.parametrize(
+    ("broken", "failure", "code", "left"),
+    [
+        (JSON, REFUSED, 4, []),
+        (REJECTED, REFUSED, 4, [ANNOTATED, JSON]),
+        (ANNOTATED, REFUSED, 4, [REJECTED, JSON]),
+        (ANNOTATED, MemoryError(), 3, [REJECTED, JSON]),
+        (ANNOTATED, ZeroDivisionError("oh"), 1, [REJECTED, JSON]),
+        (ANNOTATED, KeyboardInterrupt(), 130, []),
+    ],
+)
+@pytest.mark.parametrize("old", [False, True])
+def test_the_json_is_kept_when_another_output_fails(run_cylx, scan, monkeypatch, broken, failure, code, left, old):
+    kept = [ANNOTATED, REJECTED, JSON] if old else []
+    for name in kept:
+        scan.with_name(name).write_text("old")
+
+    def refusing(write):
+        def refuse(path, *args, **settings):
+            write(path, *args, **settings)
+            if known_name(path).endswith(broken):
+                raise failure
+
+        return refuse
+
+    for name in ("write_text", "write_annotated"):
+        monkeypatch.setattr(f"cylx.io.{name}", refusing(getattr(cylx.io, name)))
+    done = run_cylx("extract", scan, "-q", "--rejected", scan.with_name(REJECTED), *["--overwrite"] * old)
+    assert done.exit_code == code
+    assert len(done.stderr.splitlines()) == 1
+    if isinstance(failure, ZeroDivisionError):
+        assert done.stderr.endswith(f"the input was {scan}, and the output {scan.with_name(broken)}\n")
+    assert names(scan.parent) == sorted([*(left or kept), "scan.xyz"])
+    assert all((scan.with_name(name).read_bytes() == b"old") is (not left) for name in left or kept)
+
+
+def test_all_outputs_that_fail_are_named_in_one_line(run_cylx, scan, fake_pipeline, monkeypatch):
+    folder = scan.with_name("gone")
+    folder.mkdir()
+
+    def seek_meanwhile(*args, **kwargs):
+        folder.rmdir()
+        return fake_pipeline(*args, **kwargs)
+
+    monkeypatch.setattr("cylx.pipeline.extract_cylinders", seek_meanwhile)
+    options = ["--annotated", folder / "a.ply", "--rejected", folder / REJECTED]
+    done = run_cylx("extract", scan, *options)
+    assert done.exit_code == 4
+    first, *_, last = done.stderr.splitlines()
+    assert first == f"{scan}: 2 cylinders, written to {scan.with_name(JSON)}"
+    fault = f"the folder {str(folder)!r} does not exist; create it first"
+    assert last == f"cylx: {folder / 'a.ply'}, {folder / REJECTED}: {fault}"
+    assert names(scan.parent) == [JSON, scan.name]
 
 
 @pytest.mark.parametrize(

@@ -87,11 +87,11 @@ def test_a_picture_without_matplotlib_is_refused_before_computing(run_cylx, scan
     assert run_cylx("extract", scan, "--report", tmp_path / "a.html").exit_code == 0
 
 
-def test_a_picture_that_cannot_be_drawn_leaves_nothing_behind(run_cylx, scan, tmp_path, monkeypatch):
+def test_the_others_are_kept_if_the_picture_cannot_be_drawn(run_cylx, scan, tmp_path, monkeypatch):
     def fail(_):
         raise MemoryError
 
     monkeypatch.setattr("cylx.report.png_of", fail)
     options = ["--png", tmp_path / "a.png", "--report", tmp_path / "a.html"]
     assert run_cylx("extract", scan, *options).exit_code == 3
-    assert names(tmp_path) == ["scan.xyz"]
+    assert names(tmp_path) == ["a.html", "scan.annotated.ply", "scan.cylinders.json", "scan.xyz"]

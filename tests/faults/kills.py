@@ -17,6 +17,7 @@ from pathlib import Path
 
 from cylx import synthetic
 from cylx.io import write_cloud
+from tests.support.patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 SIGNALS = ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT")
@@ -27,20 +28,19 @@ WAYS = {
     "batch --jobs 2": [*BATCH, "--jobs", "2"],
 }
 QUIET_END = {"SIGKILL": -9, "SIGTERM": -15, "SIGHUP": -1, "SIGINT": 130}
-TOO_LONG = 300
 
 
 class Bench:
     """A folder with scans, and what comes out of them."""
 
-    def __init__(self, folder, scans=3):
+    def __init__(self, folder, ways=tuple(WAYS), *, scans=3, points=1500):
         self.folder = folder
         (folder / "scans").mkdir()
         for seed in range(scans):
-            write_cloud(folder / "scans" / f"{seed}.ply", synthetic.single(points=1500, seed=seed).points)
+            write_cloud(folder / "scans" / f"{seed}.ply", synthetic.single(points=points, seed=seed).points)
         self.whole, self.seconds = {}, {}
-        for way in WAYS:
-            self.run(way, f"warm {way}")
+        self.run(ways[0], "warm")
+        for way in ways:
             started = time.monotonic()
             assert self.run(way, f"whole {way}").returncode == 0
             self.seconds[way] = time.monotonic() - started
@@ -64,7 +64,7 @@ class Bench:
 
     def run(self, way, out, *options):
         process = self.start(way, out, *options)
-        _, said = process.communicate(timeout=TOO_LONG)
+        _, said = process.communicate(timeout=PATIENCE)
         process.said = said.decode()
         return process
 
@@ -73,7 +73,7 @@ class Bench:
         process = self.start(way, out)
         time.sleep(after)
         os.killpg(process.pid, getattr(signal, name))
-        _, said = process.communicate(timeout=TOO_LONG)
+        _, said = process.communicate(timeout=PATIENCE)
         wrong = self.faults_of_killed(name, way, out, process.returncode, said.decode())
         resumed = self.run(way, out, "--resume")
         if resumed.returncode != 0 or contents(self.folder / out) != self.whole[way]:
@@ -99,7 +99,7 @@ class Bench:
         """Start two runs on one output; exactly one may succeed."""
         (self.folder / out).mkdir()
         both = [self.start("single", out) for _ in range(2)]
-        said = [process.communicate(timeout=TOO_LONG)[1].decode() for process in both]
+        said = [process.communicate(timeout=PATIENCE)[1].decode() for process in both]
         codes = sorted(process.returncode for process in both)
         whole = contents(self.folder / out) == self.whole["single"]
         return [] if codes == [0, 4] and whole else [f"exit codes {codes}, whole: {whole}: {said}"]
@@ -113,13 +113,13 @@ def hidden(folder):
     return [name for name in contents(folder) if name.startswith(".")]
 
 
-def torture(kills, pairs, seed, show=print):
-    """Kill so many runs, and start so many pairs; give the faults."""
+def torture(kills, pairs, seed, show=print, **scans):
+    """Kill so many runs, and start so many pairs; give the faults. `scans` are the settings of the bench."""
     rng, faults, counts = random.Random(seed), [], Counter()
     with tempfile.TemporaryDirectory(prefix="cylx-kills-") as place:
-        bench = Bench(Path(place))
+        bench = Bench(Path(place), **scans)
         for index in range(kills):
-            way, name = list(WAYS)[index % len(WAYS)], SIGNALS[index // len(WAYS) % len(SIGNALS)]
+            way, name = list(WAYS)[index % len(WAYS)], SIGNALS[index % len(SIGNALS)]
             after = bench.seconds[way] * rng.uniform(0.15, 1.05)
             wrong = bench.kill_one(name, way, after, f"out{index}")
             counts[way, name, bool(wrong)] += 1

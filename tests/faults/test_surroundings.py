@@ -12,6 +12,7 @@ import pytest
 
 from cylx.cli.terminal import signals
 from cylx.cli.terminal.signals import Ended, check_heard, hear, heard
+from tests.support.patience import PATIENCE
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="of Unix")
 CYLX = f"{sys.executable} -m cylx"
@@ -27,7 +28,9 @@ def shell(tmp_path):
     def run(line, **environment):
         root = os.path.dirname(os.path.dirname(os.path.abspath(__import__("cylx").__file__)))  # noqa: PTH100, PTH120
         env = {**os.environ, "PYTHONPATH": root, "cylx": CYLX, **environment}
-        return subprocess.run(["sh", "-c", line], cwd=tmp_path, env=env, capture_output=True, check=False, timeout=120)
+        return subprocess.run(
+            ["sh", "-c", line], cwd=tmp_path, env=env, capture_output=True, check=False, timeout=PATIENCE
+        )
 
     return run
 

@@ -2,6 +2,7 @@
 
 import argparse
 import hashlib
+import os
 import random
 import sys
 import time
@@ -16,7 +17,9 @@ from tests.fuzz.targets import TARGETS
 LONGEST = 1000
 """Letters of a message: some hundred."""
 SLOWEST = 5.0
-"""Seconds an input of a few thousand bytes may take."""
+"""Seconds of processor time that an input of a few thousand bytes may take; the machine may be busy, ..."""
+_WAITING = 60.0
+"""... but not so that it takes these seconds for each of them."""
 MOST_FILES = 20
 """Findings of one kind that are kept."""
 
@@ -34,7 +37,7 @@ def judge(function, data, *, slowest=SLOWEST):
     """Return `success`, `error`, or a description of the defect."""
     from cylx.errors import CylxError
 
-    started = time.perf_counter()
+    started, spent = time.perf_counter(), _processor_time()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
@@ -51,8 +54,14 @@ def judge(function, data, *, slowest=SLOWEST):
         frames = traceback.extract_tb(failure.__traceback__)
         ours = next((frame for frame in reversed(frames) if "/cylx/" in frame.filename), frames[-1])
         verdict = f"{type(failure).__name__} at {Path(ours.filename).name}:{ours.lineno}: {str(failure)[:200]!r}"
-    seconds = time.perf_counter() - started
+    seconds = max(_processor_time() - spent, (time.perf_counter() - started) / _WAITING)
     return verdict if seconds < slowest else f"slow: {seconds:.1f} s, then {verdict[:100]}"
+
+
+def _processor_time():
+    """Return the processor time of this process and of those that it has waited for."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def inputs_of(seeds, rng):

@@ -2,6 +2,7 @@
 
 import json
 import os
+import struct
 import tempfile
 from pathlib import Path
 
@@ -62,6 +63,34 @@ def read_las_here(data):
     cloud = PointCloud(points, table, None, Source("scan.las", "las", header=header))
     check_cloud(cloud)
     return cloud
+
+
+def guard_e57(data):
+    """Check the XML of an E57 file; what passes is harmless to a parser that opens and expands everything."""
+    from xml.parsers import expat
+
+    from cylx.io.e57_xml import check_xml
+    from cylx.io.inputs import open_input
+
+    payload = bytes(48) + data
+    pages = b"".join(
+        payload[place : place + 1020].ljust(1020, b"\0") + bytes(4) for place in range(0, len(payload), 1020)
+    )
+    head = struct.pack("<8s2I4Q", b"ASTM-E57", 1, 0, len(pages), 48, len(data), 1024)
+    with open_input(SCRATCH.put("scan.e57", head[:48] + pages[48:])) as source:
+        check_xml(source)
+
+    def harm(*_):
+        raise AssertionError("a DOCTYPE or an entity gets through")
+
+    def start(_name, attributes):
+        if any(name.lower().endswith("schemalocation") for name in attributes):
+            raise AssertionError("the place of a schema gets through")
+
+    parser = expat.ParserCreate()
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = harm
+    parser.StartElementHandler = start
+    parser.Parse(data.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n"), True)
 
 
 def check_cloud(cloud):
@@ -187,13 +216,24 @@ def seeds_of(name):
         name, name
     )
     if name in ("guessed", "ply-annotated"):
-        return [path.read_bytes() for path in sorted(SEEDS.glob("*/*")) if path.parent.name in _SUFFIXES | {"text": ""}]
-    return [path.read_bytes() for path in sorted(folder.iterdir())]
+        files = (path for path in sorted(SEEDS.glob("*/*")) if path.parent.name in _SUFFIXES | {"text": ""})
+    else:
+        files = sorted(folder.iterdir())
+    return [seed for seed in (path.read_bytes() for path in files) if not _is_packed(seed)]
+
+
+def _is_packed(seed):
+    """Return whether a seed is a PCD whose body is unpacked in another process, whose start takes longer than all else.
+
+    It has a target of its own, among those of native code.
+    """
+    return b"DATA binary_compressed" in seed
 
 
 FUNCTIONS = {
     **{name: read_scan(suffix) for name, suffix in _SUFFIXES.items()},
     "las": read_las_here,
+    "e57-guard": guard_e57,
     "las-annotated": annotate(read_las_here, ".las"),
     "ply-annotated": annotate(read_scan(""), ".ply"),
     "config": read_config,

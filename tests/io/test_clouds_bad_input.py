@@ -40,7 +40,7 @@ def pcd(body=b"", **changed):
 
 PLY = {
     b"": "scan: is empty; check how it was made",
-    b"PLY\n": "scan: is not PLY: it does not begin with the line 'ply'; give it its right suffix",
+    b"plyer\n": "scan: is not PLY: it does not begin with the line 'ply'; give it its right suffix",
     b"ply": f"scan: the file ends within the PLY header; {COPY}",
     ply()[:-1]: f"scan: the file ends within the PLY header; {COPY}",
     b"ply\n" + b"comment\n" * 140000: "scan: the PLY header has no end; export the file again",

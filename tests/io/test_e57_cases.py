@@ -10,6 +10,7 @@ import pytest
 
 from cylx.errors import InputError
 from cylx.io import read_cloud
+from tests.support.patience import PATIENCE
 
 MAKER = Path(__file__).resolve().parents[3] / "shared" / "cases" / "e57-quirks" / "make.py"
 if not MAKER.exists() and os.environ.get("CI") != "true":
@@ -19,7 +20,7 @@ if not MAKER.exists() and os.environ.get("CI") != "true":
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("cases")
-    subprocess.run([sys.executable, str(MAKER)], cwd=folder, check=True, capture_output=True, timeout=60)
+    subprocess.run([sys.executable, str(MAKER)], cwd=folder, check=True, capture_output=True, timeout=PATIENCE)
     return folder
 
 

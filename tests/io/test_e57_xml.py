@@ -1,6 +1,7 @@
 """XML of E57 files that would make the library read files, ask the network or never end."""
 
 import struct
+import time
 
 import numpy as np
 import pye57
@@ -8,6 +9,8 @@ import pytest
 
 from cylx.errors import InputError
 from cylx.io import read_cloud
+from cylx.io.e57_xml import check_xml
+from cylx.io.inputs import open_input
 from tests.support.e57 import with_xml, xml_of
 
 POINTS = np.random.default_rng(0).uniform(0, 1, (50, 3))
@@ -88,6 +91,11 @@ def test_a_declaration_that_hides_its_encoding_is_refused(tmp_path, plain, decla
     assert fault_of(tmp_path, with_xml(plain, declared + b"+ADwAIQ-DOCTYPE a []+AD4-" + parts(plain)[1])) == NO_TEXT
 
 
+def test_what_only_looks_like_a_declaration_declares_nothing(tmp_path, plain):
+    xml = b'<?xmll version="1.0" encoding="iso-8859-1"?><e57Root>\xdf</e57Root>'
+    assert fault_of(tmp_path, with_xml(plain, xml)) == NO_TEXT
+
+
 @pytest.mark.parametrize("declared", [b"", b'<?xml version="1.0"?>', b"<?xml version='1.0' encoding='utf-8' ?>"])
 def test_honest_declarations(tmp_path, plain, declared):
     (tmp_path / "scan.e57").write_bytes(with_xml(plain, declared + parts(plain)[1]))
@@ -123,3 +131,42 @@ def test_a_header_that_leads_nowhere(tmp_path, plain, place, value, message):
     struct.pack_into("<Q", data, place, value)
     assert fault_of(tmp_path, bytes(data)).startswith(message)
     assert fault_of(tmp_path, plain[:40]).startswith("broken E57: the file ends within its header; ")
+
+
+MANY = 300_000
+
+
+@pytest.mark.parametrize(
+    ("parts", "message"),
+    {
+        "deep": (
+            b'<a type="Structure">' * MANY + b"</a>" * MANY,
+            f"its XML has more than 100 elements within one another, which E57 does not use; {MISTRUST}",
+        ),
+        "deep without an end": (
+            b'<a b="/>">' * MANY,
+            f"its XML has more than 100 elements within one another, which E57 does not use; {MISTRUST}",
+        ),
+        "wide": (
+            b'<a type="Integer"/>' * MANY,
+            f"its XML has an element of more than 4096 parts, which E57 does not use; {MISTRUST}",
+        ),
+        "not well-formed": (b"<a></b>", "broken E57: its XML is not well-formed, mismatched tag: "),
+    }.values(),
+    ids=["deep", "deep without an end", "wide", "not well-formed"],
+)
+def test_absurd_shapes_are_refused_at_once(tmp_path, plain, parts, message):
+    head, end, tail = xml_of(plain).rpartition(b"</e57Root>")
+    (tmp_path / "scan.e57").write_bytes(with_xml(plain, head + parts + end + tail))
+    started = time.process_time()
+    with pytest.raises(InputError) as refused, open_input(tmp_path / "scan.e57") as source:
+        check_xml(source)
+    assert time.process_time() - started < 10  # libE57 takes a minute or more
+    assert str(refused.value).startswith(f"{tmp_path / 'scan.e57'}: {message}")
+
+
+def test_a_list_may_have_as_many_parts_as_it_likes(tmp_path, plain):
+    head, end, tail = xml_of(plain).rpartition(b"</e57Root>")
+    parts = b'<v type="Vector" allowHeterogeneousChildren="1">' + b'<a type="Integer"/>' * 5000 + b"</v>"
+    (tmp_path / "scan.e57").write_bytes(with_xml(plain, head + parts + end + tail))
+    assert len(read_cloud(tmp_path / "scan.e57").points) == len(POINTS)

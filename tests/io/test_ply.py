@@ -1,6 +1,7 @@
 """PLY: every variant reads to the same points and properties."""
 
 import io
+import re
 import struct
 
 import numpy as np
@@ -11,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 from plyfile import PlyData, PlyElement
 
 from cylx.errors import InputError
-from cylx.io import read_cloud, write_cloud
+from cylx.io import expected_points, read_cloud, write_annotated, write_cloud
 
 SCALARS = ["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"]
 FAR = np.array([[512345.678, 5412345.432, 123.4], [5e6 + 0.001, -5e6 - 0.002, 0.003], [1e-3, 0.1, 1 / 3]])
@@ -48,6 +49,49 @@ def read(tmp_path):
         return read_cloud(path)
 
     return read
+
+
+def in_words(change):
+    """Return a function that changes the words of a header, and not its body."""
+
+    def changed(data):
+        head, mark, body = data.partition(b"end_header\n")
+        return change(head + mark) + body
+
+    return changed
+
+
+HEADERS = {
+    "everything in capitals": bytes.upper,
+    "keywords in capitals": lambda head: re.sub(rb"(?m)^[a-z_]+", lambda word: word[0].upper(), head),
+    "types with a capital": lambda head: head.replace(b"double", b"Double"),
+    "a capital": lambda head: head.replace(b"element vertex", b"element Vertex"),
+    "vertices": lambda head: head.replace(b"element vertex", b"element vertices"),
+    "point": lambda head: head.replace(b"element vertex", b"element point"),
+    "Points": lambda head: head.replace(b"element vertex", b"element Points"),
+    "capital coordinates": lambda head: re.sub(rb"(?m) [xyz]$", lambda axis: axis[0].upper(), head),
+    "lines of Windows": lambda head: head.replace(b"\n", b"\r\n"),
+    "lines of an old Mac": lambda head: head.replace(b"\n", b"\r"),
+    "blanks behind the first word": lambda head: head.replace(b"ply\n", b"ply \t\n", 1),
+    "a mark of UTF-8": lambda head: b"\xef\xbb\xbf" + head,
+    "lines that are indented": lambda head: head.replace(b"\nproperty", b"\n  property"),
+}
+
+
+@pytest.mark.parametrize("name", ["scan.ply", "scan"], ids=["suffix", "content"])
+@pytest.mark.parametrize("encoding", ENCODINGS)
+@pytest.mark.parametrize("kind", HEADERS)
+def test_headers_that_others_write_are_read_and_what_is_written_back_is_standard(
+    read, tmp_path, make_extraction, kind, encoding, name
+):
+    table = vertices(np.array([[0.0, 0.5, 1.0], [2.0, 2.5, -3.0]]), label=np.array([7, 8], "i4"))
+    cloud = read(in_words(HEADERS[kind])(ply_bytes(table, encoding, faces=[(0, 1, 1)])), name)
+    assert np.array_equal(cloud.points, np.column_stack([table[axis] for axis in "xyz"]))
+    assert expected_points(tmp_path / name) == 2
+    write_annotated(tmp_path / "out.ply", make_extraction(cloud))
+    again = PlyData.read(tmp_path / "out.ply")["vertex"]
+    assert all(np.array_equal(again[key], cloud.table[key]) for key in cloud.table.dtype.names)
+    assert np.array_equal(read_cloud(tmp_path / "out.ply").points, cloud.points)
 
 
 @pytest.mark.parametrize("encoding", ENCODINGS)

@@ -27,6 +27,7 @@ def quoted(mark):
     return lambda _, p: ['"' + repr(x).replace(".", mark) + '"' for x in p]
 
 
+LINES = rows().splitlines(keepends=True)
 PTS = rows(more, " ").splitlines(keepends=True)
 SILENT = {
     "units in round brackets": "X (m),Y (m),Z (m)\n" + rows(),
@@ -85,6 +86,10 @@ SILENT = {
     "a count of points": "30 points\nX Y Z I\n" + "".join(PTS),
     "count above names": "30\nX Y Z I\n" + "".join(PTS),
     "blocks with counts": "x y z i\n10\n" + "".join(PTS[:10]) + "20\n" + "".join(PTS[10:]),
+    "counts of all blocks but the first": "x y z i\n" + "".join(PTS[:10]) + "20\n" + "".join(PTS[10:]),
+    "a count of a block as large as the first": "x y z i\n" + "".join([*PTS[:15], "15\n", *PTS[15:]]),
+    "a block of nothing": "0\n30\nx y z i\n" + "".join(PTS),
+    "counts with empty cells": "10,,\nx,y,z\n" + "".join(LINES[:10]) + "20,,\n" + "".join(LINES[10:]),
     "values that are missing": "x,y,z,label\n" + rows(lambda i, p: [*p, "" if i % 2 else i]),
     "a column without values": "x,y,z,label\n" + rows(lambda _, p: [*p, ""]),
     "a first column without values": "label,x,y,z\n" + rows(lambda _, p: ["", *p]),
@@ -254,6 +259,10 @@ WRONG = {
         "complete copy of the file, or correct the count",
     ),
     "a row of one number": ("".join([*PTS[:10], "7\n", *PTS[10:]]), f":11: expected 4 columns, found 1; {COLUMNS}"),
+    "a count of one block among those without": (
+        "".join([*PTS[:10], "15\n", *PTS[10:25], "7\n", *PTS[25:]]),
+        f":11: expected 4 columns, found 1; {COLUMNS}",
+    ),
     "one long line": ("1 " * 1_000_000, ":1: the line is too long for a row; give every point a line"),
     "a long line between others": (
         "1 2 3\n" * 10 + "1 " * 1_000_000,

@@ -25,6 +25,7 @@ from cylx.report.page_data import page_data_of
 from cylx.report.picture import outline
 from cylx.report.points import STEPS_ACROSS_BOX
 from cylx.results import Result
+from tests.support.patience import PATIENCE
 
 HOSTILE = "</script><img src=x onerror=alert(1)>&lt;\u2028\"'{{script}}.ply"
 
@@ -191,7 +192,7 @@ def browse(tmp_path):
         command = [BROWSER, "--headless=new", "--no-sandbox", f"--user-data-dir={tmp_path / 'profile'}"]
         command += ["--disable-background-networking", "--enable-logging=stderr", "--virtual-time-budget=3000"]
         command += ["--window-size=1280,900", *options, "--dump-dom", f"{path.as_uri()}#selftest"]
-        done = subprocess.run(command, capture_output=True, timeout=60, check=False)
+        done = subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
         body = re.search(r"<body[^>]*>", done.stdout.decode("utf-8", "replace"))
         assert body, done.stderr.decode("utf-8", "replace")[-2000:]
         told = re.search(r'data-selftest="([^"]*)"', body[0])

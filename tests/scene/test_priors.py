@@ -25,8 +25,8 @@ def sample(request):
 
 
 @pytest.fixture(scope="module")
-def found(sample):
-    return extract(sample)
+def found(sample, extract_file):
+    return extract_file(sample)
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ import click
 
 from cylx.cli.batch.found import found_line
 from cylx.cli.batch.memory import cores, memory_needed
-from cylx.cli.batch.outcomes import Finished, Outcome, check_required, entry_of, failed_outcome, lost_outcome
+from cylx.cli.batch.outcomes import Finished, Outcome, check_finished, entry_of, failed_outcome, lost_outcome
 from cylx.cli.batch.resume import check_own, finished_before, is_own_json, written_by
 from cylx.cli.batch.run import attempt
 from cylx.cli.batch.summary import LIST, is_own_table, list_text, table_text
@@ -120,7 +120,7 @@ class Batch:
             self.outcomes[0] = Outcome("done", finished, peak=peak_memory())
             if before is not None:
                 self.run.messages.say(f"{found_line(job, finished.cylinders, finished.blends)} before")
-            check_required(job, finished.cylinders, self.run.require)
+            check_finished(job, finished, self.run.require)
         except Exception as failure:
             known = self.outcomes.get(0)
             self.outcomes[0] = failed_outcome(failure, None if known is None else known.finished, debug=False)
@@ -175,7 +175,7 @@ class Batch:
 
     def _skipped(self, job: Job, finished: Finished) -> Outcome:
         try:
-            check_required(job, finished.cylinders, self.run.require)
+            check_finished(job, finished, self.run.require)
         except NothingFoundError as failure:
             return failed_outcome(failure, finished, debug=False)
         return Outcome("skipped", finished)
@@ -193,7 +193,8 @@ class Batch:
         if outcome.status == "skipped":
             self.run.messages.say(f"{found_line(job, outcome.finished.cylinders, outcome.finished.blends)} before")
         else:
-            self.run.messages.say(found_line(job, outcome.finished.cylinders, outcome.finished.blends))
+            written = job.without(outcome.finished.unwritten)
+            self.run.messages.say(found_line(written, outcome.finished.cylinders, outcome.finished.blends))
             for warning in outcome.finished.warnings:
                 self.run.messages.say(f"warning: {printable(job.scan)}: {warning}")
             for note in outcome.finished.notes:

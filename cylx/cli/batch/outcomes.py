@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import signal
 import traceback
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
 from cylx.cli.batch.summary import legible
-from cylx.cli.terminal.failures import BUG, UNUSABLE, describe_failure
+from cylx.cli.terminal.failures import BUG, UNUSABLE, UnforeseenError, describe_failure
 from cylx.cli.terminal.stopwatch import peak_memory
-from cylx.errors import NothingFoundError
+from cylx.errors import CylxError, NothingFoundError, OutputError
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
@@ -33,6 +33,10 @@ class Finished:
         Their number; 0 if they were not looked for.
     notes : sequence of str
         How the scan was read, and how its annotated cloud was written, if that needs a word.
+    unwritten : sequence of str
+        The outputs beside the JSON that could not be written.
+    failure : Exception, optional
+        Why not.
     """
 
     points: int
@@ -41,6 +45,8 @@ class Finished:
     profile: dict[str, object] | None = None
     blends: int = 0
     notes: Sequence[str] = ()
+    unwritten: Sequence[str] = ()
+    failure: Exception | None = None
 
 
 @dataclass(frozen=True)
@@ -71,22 +77,40 @@ class Outcome:
     trace: str = ""
 
 
-def check_required(job: Job, found: int, required: int | None) -> None:
-    """Check that at least the required number of cylinders was found.
+def check_finished(job: Job, finished: Finished, required: int | None) -> None:
+    """Check that all outputs were written, and at least the required number of cylinders was found.
 
     Raises
     ------
+    OutputError
+        If an output could not be written; a bug is raised as it is.
     NothingFoundError
-        If there are fewer.
+        If there are fewer cylinders.
     """
+    if finished.failure is not None:
+        raise finished.failure
+    found = finished.cylinders
     if required is not None and found < required:
         fault = f"{found} found, {required} required"
         raise NothingFoundError(job.scan, f"cylinders: {fault}", "look at the scan, or require fewer")
 
 
+def failure_of(scan: str, failed: Mapping[str, Exception]) -> Exception | None:
+    """Return the failure to report for the outputs of a scan that could not be written; a bug comes first."""
+    for name, failure in failed.items():
+        if not isinstance(failure, CylxError | BrokenPipeError):
+            return UnforeseenError(f"{scan}, and the output {name}", failure)
+    first = next(iter(failed.values()), None)
+    if isinstance(first, OutputError) and len(failed) > 1:
+        places = [failure.place for failure in failed.values() if isinstance(failure, CylxError)]
+        return OutputError(", ".join(places), first.fault, first.remedy)
+    return first
+
+
 def failed_outcome(failure: Exception, finished: Finished | None, *, debug: bool) -> Outcome:
     """Return the outcome of a scan that failed, with or without outputs."""
     line, code = describe_failure(failure)
+    finished = None if finished is None else replace(finished, failure=None)  # not every exception can be sent
     trace = "".join(traceback.format_exception(failure)).rstrip() if debug else ""
     return Outcome("failed", finished, line.removeprefix("cylx: "), code, peak_memory(), trace)
 

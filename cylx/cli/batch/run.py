@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from cylx.cli.batch.annotated import check_format
 from cylx.cli.batch.jobs import Job, write_job
-from cylx.cli.batch.outcomes import Finished, Outcome, check_required, failed_outcome
+from cylx.cli.batch.outcomes import Finished, Outcome, check_finished, failed_outcome, failure_of
 from cylx.cli.terminal.failures import blamed_on
 from cylx.cli.terminal.signals import Listener, check_heard
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
@@ -53,7 +53,7 @@ class Run:
         InputError
             If the scan cannot be read or used.
         OutputError
-            If the outputs cannot be written.
+            If the JSON cannot be written; what went wrong with the other outputs is in what is returned.
         """
         from cylx.cli.batch.found import report
         from cylx.cli.terminal.display import Observers, observed
@@ -78,16 +78,25 @@ class Run:
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
             check_unchanged(job.scan, stamp, cloud.source.sha256)
             with observed(observer, "writing"):
-                remarks = write_job(job, extraction, overwrite=self.overwrite)
+                written = write_job(job, extraction, overwrite=self.overwrite)
         found = len(extraction.cylinders)
         profile = stopwatch.report(cloud.rows, found)
-        report(self.messages, job, extraction)
-        for remark in remarks:
+        report(self.messages, written.job, extraction)
+        for remark in written.remarks:
             self.messages.say(f"warning: {remark}")
         notes = [*cloud.source.notes, *notes]
         for note in notes:
             self.messages.say(f"note: {note}")
-        return Finished(cloud.rows, found, extraction.warnings, profile, len(extraction.blends or ()), notes)
+        return Finished(
+            cloud.rows,
+            found,
+            extraction.warnings,
+            profile,
+            len(extraction.blends or ()),
+            notes,
+            list(written.failed),
+            failure_of(job.scan, written.failed),
+        )
 
 
 def attempt(run: Run, debug: bool, job: Job) -> Outcome:
@@ -96,7 +105,7 @@ def attempt(run: Run, debug: bool, job: Job) -> Outcome:
     try:
         with blamed_on(job.scan):
             finished = run.extract_one(job)
-        check_required(job, finished.cylinders, run.require)
+        check_finished(job, finished, run.require)
     except Exception as failure:  # noqa: BLE001  reported with exit code and traceback; a bug is reported as a bug
         return failed_outcome(failure, finished, debug=debug)
     return Outcome("done", finished, peak=peak_memory())

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from cylx import synthetic
 from cylx.cli.batch import memory, workers
 from cylx.cli.batch.workers import Lost, Workers
 from cylx.io import temporary_beside, write_cloud
+from tests.support.patience import PATIENCE
 
 POSIX = pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
 SLEEP = "(__import__('time').monotonic(), __import__('time').sleep(0.15), __import__('time').monotonic())"
@@ -55,13 +57,17 @@ def started(place):
     running = []
 
     def start(out):
-        process = subprocess.Popen(
-            command(place, out, "--jobs", "2"), cwd=place, stderr=subprocess.PIPE, start_new_session=True
-        )
-        running.append(process)
-        while process.poll() is None and len(list((place / out).glob("*.json"))) < 2:
-            time.sleep(0.01)
-        return process
+        for _ in range(20):  # the machine may be too busy to see the first results before the last
+            shutil.rmtree(place / out, ignore_errors=True)
+            process = subprocess.Popen(
+                command(place, out, "--jobs", "2"), cwd=place, stderr=subprocess.PIPE, start_new_session=True
+            )
+            running.append(process)
+            while process.poll() is None and len(list((place / out).glob("*.json"))) < 2:
+                time.sleep(0.01)
+            if process.poll() is None:
+                return process
+        raise AssertionError("it is always done before it can be stopped")
 
     yield start
     for process in running:
@@ -86,7 +92,7 @@ def test_two_processes_give_the_same_bytes(place, whole, tmp_path):
 def test_ctrl_c_leaves_whole_files_only(place, whole, started):
     process = started("stopped")
     os.killpg(process.pid, signal.SIGINT)  # as the terminal does: to all of them
-    _, said = process.communicate(timeout=30)
+    _, said = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert said.decode().splitlines()[-1] == "cylx: interrupted"
     assert b"Traceback" not in said
@@ -100,7 +106,7 @@ def test_ctrl_c_leaves_whole_files_only(place, whole, started):
 def test_what_was_killed_goes_on_to_the_same_bytes(place, whole, started):
     process = started("killed")
     process.kill()
-    process.communicate(timeout=30)  # the others hold its standard error, and end when they see that it is gone
+    process.communicate(timeout=PATIENCE)  # the others hold its standard error, and end when they see that it is gone
     left = contents(place / "killed")
     assert 0 < len(left) < len(whole)
     assert left.items() <= whole.items()
@@ -147,13 +153,11 @@ def test_memory_decides_how_many_work_at_once(monkeypatch, available, needs, mos
 
 def test_those_that_are_no_longer_needed_end():
     answers = Workers(eval, 2, lambda process: None)
-    running = answers.run(["1", "__import__('time').sleep(60)"], [0, 0])
+    running = answers.run(["1", "__import__('time').sleep(6000)"], [0, 0])
     assert next(running) == (0, 1)
     pids = [worker.pid for worker in (*answers._busy.values(), *answers._idle)]
     assert len(pids) == 2
-    started = time.monotonic()
-    running.close()
-    assert time.monotonic() - started < 8
+    running.close()  # and does not wait until they have done their work
     assert not any(memory.memory_held(pid) for pid in pids)
 
 

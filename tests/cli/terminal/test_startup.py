@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from cylx.cli.terminal.startup import BLAS
+from tests.support.patience import PATIENCE
 
 SAMPLE = Path(__file__).parents[3] / "sample_data" / "room.pcd"
 
@@ -12,7 +13,7 @@ SAMPLE = Path(__file__).parents[3] / "sample_data" / "room.pcd"
 def told(program, *arguments):
     """Run a program in a process of its own; give what it printed last."""
     command = [sys.executable, "-c", program, *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=300).stdout.splitlines()[-1]
+    return subprocess.run(command, capture_output=True, text=True, check=True, timeout=PATIENCE).stdout.splitlines()[-1]
 
 
 def test_the_command_line_does_without_linear_algebra(tmp_path):

@@ -1,0 +1,151 @@
+"""A process that has imported cylx and loaded its kernels, and forks for each call of a command: no call starts cold.
+
+What an extraction gives is remembered, too: pages and tests about commands extract the same scans again and again.
+
+`python -m tests.support.warm SOCKET FOLDER` serves. `calls(SOCKET)` is the text of a command that passes its arguments,
+folder, environment and streams on, and ends as the process does that runs cylx for it.
+"""
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import pickle
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+_CALL = """#!{python} -ISE
+import json, os, signal, socket, sys
+with socket.socket(socket.AF_UNIX) as server:
+    server.connect({path!r})
+    socket.send_fds(server, [b"!"], [0, 1, 2])
+    server.sendall(json.dumps([os.getcwd(), dict(os.environ), sys.argv[1:]]).encode())
+    server.shutdown(socket.SHUT_WR)
+    status = int(server.makefile().read())
+if status < 0:
+    signal.signal(-status, signal.SIG_DFL)
+    os.kill(os.getpid(), -status)
+sys.exit(status)
+"""
+POSSIBLE = hasattr(os, "fork") and hasattr(socket, "send_fds") and sys.platform.startswith("linux")
+
+
+def calls(path):
+    """Return the text of a command that calls the process at a socket."""
+    return _CALL.format(python=sys.executable, path=str(path))
+
+
+@contextlib.contextmanager
+def serving(path, folder):
+    """Start the process, which remembers extractions in a folder; wait until it is ready, and stop it at the end."""
+    command = [sys.executable, "-m", "tests.support.warm", str(path), str(folder)]
+    with subprocess.Popen(command, cwd=Path(__file__).resolve().parents[2], stdout=subprocess.PIPE) as process:
+        assert process.stdout.readline() == b"ready\n"
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+def serve(path):
+    """Wait for calls; returns in a process of its own for each of them."""
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # nobody asks how those that answer have ended
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(path)
+        server.listen()
+        print("ready", flush=True)
+        while True:
+            caller, _ = server.accept()
+            if os.fork() == 0:
+                break
+            caller.close()
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    _, streams, _, _ = socket.recv_fds(caller, 1, 3)
+    folder, environment, arguments = json.loads(caller.makefile().read())
+    process = os.fork()
+    if process:
+        status = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        with contextlib.suppress(OSError):
+            caller.sendall(str(status).encode())
+        os._exit(0)
+    caller.close()
+    for place, stream in enumerate(streams):
+        os.dup2(stream, place)
+        os.close(stream)
+    names = ("stdin", "stdout", "stderr")
+    for place, name in enumerate(names):
+        stream = open(place, "w" if place else "r", 1 if place == 2 else -1, "utf-8", closefd=False)  # noqa: SIM115
+        setattr(sys, name, stream)
+    os.chdir(folder)
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.argv[1:] = arguments
+
+
+class Recorder:
+    """An observer that remembers what it is told, to tell another one."""
+
+    def __init__(self, listener):
+        self.listener, self.told = listener, []
+
+    def __getattr__(self, name):
+        def tell(*args):
+            self.told.append((name, args))
+            getattr(self.listener, name)(*args)
+
+        return tell
+
+
+def remembered(extract, folder):
+    """Return a function that keeps what an extraction gives, as the same points and settings give the same."""
+    from cylx.records import SilentObserver
+
+    def extract_once(cloud, config, *, threads=None, observer=None):
+        observer = observer or SilentObserver()
+        valid = b"" if cloud.valid is None else cloud.valid.tobytes()
+        about = f"{cloud.source!r} {cloud.rows} {config.model_dump_json()}".encode()
+        path = folder / hashlib.sha256(b"|".join([cloud.points.tobytes(), valid, about])).hexdigest()
+        if path.is_file():
+            with path.open("rb") as file:
+                unpickler = pickle.Unpickler(file)
+                unpickler.persistent_load = lambda _: cloud
+                found, told = unpickler.load()
+            for name, args in told:
+                getattr(observer, name)(*args)
+            return found
+        recorder = Recorder(observer)
+        found = extract(cloud, config, threads=threads, observer=recorder)
+        kept = io.BytesIO()
+        pickler = pickle.Pickler(kept)
+        pickler.persistent_id = lambda one: "the cloud" if one is cloud else None
+        pickler.dump((found, recorder.told))
+        temporary = path.with_suffix(f".{os.getpid()}")
+        temporary.write_bytes(kept.getvalue())
+        temporary.replace(path)
+        return found
+
+    return extract_once
+
+
+def load(folder):
+    """Import what a run imports, load what it calls, and let extractions be remembered in a folder."""
+    import cylx.pipeline
+    from cylx.api import warmup
+
+    warmup.extract_cylinders(warmup.PointCloud(warmup.practice_cloud()), warmup.Config(), threads=1)
+    cylx.pipeline.extract_cylinders = remembered(cylx.pipeline.extract_cylinders, folder)
+    assert threading.active_count() == 1, "a process with threads cannot be forked"
+
+
+if __name__ == "__main__":
+    path, folder = sys.argv[1:]
+    load(Path(folder))
+    serve(path)
+    from cylx.__main__ import run
+
+    run()
