@@ -3,8 +3,9 @@
 A depth camera errs alike over many pixels, and a real object is no perfect cylinder. Such an error does not average out
 over the points. Here the surface is divided into cells. The mean residuals of the cells are white noise and a Gaussian
 process along the surface, with the covariance v exp(-d / l) at distance d. Variance v and length l are weighed by the
-restricted likelihood (Patterson and Thompson, Biometrika 58, 1971), in which the five parameters of the cylinder, which
-take up most of a long wave, are allowed for; all are averaged over, because a single surface tells little of l. The fit
+restricted likelihood (Patterson and Thompson, Biometrika 58, 1971), in which the five parameters of the cylinder and a
+slope, which take up most of a long wave, are allowed for; all are averaged over, because a single surface tells little
+of l. The fit
 weighs all points alike, and so its covariance is A^-1 X^T V X A^-1, with the rows X of the parameters, A = X^T X, and V
 the covariance of the points.
 """
@@ -69,6 +70,12 @@ def shared_covariance(
     means = np.column_stack([np.bincount(cell, term) / counts for term in terms])
     rows, values = np.ascontiguousarray(means[:, :5]), means[:, 5].copy()
     white = float(((residuals - values[cell]) ** 2).sum()) / (len(heights) - cells) / counts
+    # a cone is no wave: its radius in the middle is as certain as that of a cylinder
+    modelled = np.column_stack([rows, means[:, 6] - float((counts * means[:, 6]).sum()) / len(heights)])
+    weighted = counts[:, None] * modelled  # summed in a fixed order, which BLAS does not
+    gram = np.einsum("ia,ib->ab", weighted, modelled)
+    found = np.einsum("ab,b->a", np.linalg.pinv(gram, hermitian=True), np.einsum("ia,i->a", weighted, values))
+    values -= np.einsum("ia,a->i", modelled, found)
     turn = np.arctan2(means[:, 1], means[:, 0])
     apart = np.abs(turn[:, None] - turn)
     across = radius * np.minimum(apart, 2.0 * np.pi - apart)
@@ -81,22 +88,21 @@ def shared_covariance(
     for length in LENGTHS:
         shape = np.exp(-distances / (length * side))
         for variance in max(length, 1.0) * unit * VARIANCES:
-            likelihood = _restricted_likelihood(variance * shape + np.diag(white), rows, values)
+            likelihood = _restricted_likelihood(variance * shape + np.diag(white), modelled, values)
             tried.append((float(likelihood), float(variance), shape))
-    best = max(one[0] for one in tried)
+    best = max(likelihood for likelihood, _, _ in tried)
+    if not math.isfinite(best):  # the points do not determine the parameters
+        return None
     chosen, total = np.zeros((cells, cells)), 0.0
     for likelihood, variance, shape in tried:
         weight = math.exp(likelihood - best)
         chosen += weight * variance * shape
         total += weight
     chosen /= total
-    # sums in a fixed order, which those of BLAS are not
-    weighted = counts[:, None] * rows
-    normal = np.einsum("ia,ib->ab", weighted, rows)
-    spread = np.einsum("ia,ib->ab", weighted, np.einsum("ij,jb->ib", chosen, weighted))
-    inverse = np.linalg.inv(normal)
-    found = inverse @ spread @ inverse
-    return np.asarray(0.5 * (found + found.T), dtype=np.float64)
+    spread = np.einsum("ia,ib->ab", weighted[:, :5], np.einsum("ij,jb->ib", chosen, weighted[:, :5]))
+    inverse = np.linalg.pinv(gram[:5, :5], hermitian=True)
+    covariance = inverse @ spread @ inverse
+    return np.asarray(0.5 * (covariance + covariance.T), dtype=np.float64)
 
 
 @njit(cache=True, nogil=True)

@@ -77,7 +77,16 @@ def test_unit_and_order_do_not_matter(seed, exponent):
     assert np.allclose(larger, shared * np.outer(units, units), rtol=1e-6)
 
 
-@pytest.mark.parametrize("n", [0, 1, 5, 40])
+def test_the_middle_of_a_cone_is_as_certain_as_a_cylinder():
+    rng = np.random.default_rng(1)
+    angles, heights = rng.uniform(-1.5, 1.5, 3000), rng.uniform(-2.0, 2.0, 3000)
+    _, residuals, white = fitted(angles, heights, NOISE * rng.standard_normal(3000) + 0.02 * heights)
+    shared = shared_covariance(heights, residuals, angles, 1.0)
+    independent = white * NOISE**2 / residuals.var()
+    assert (np.diag(shared) < 2.0 * np.diag(independent)).all()
+
+
+@pytest.mark.parametrize("n", [0, 1, 5, 20])
 def test_few_points_tell_nothing(n):
     rng = np.random.default_rng(0)
     assert shared_covariance(rng.random(n), rng.random(n), rng.random(n), 1.0) is None
