@@ -60,10 +60,11 @@ class Options:
 
 
 class Outcome(NamedTuple):
-    """The extraction, and the labels of its points."""
+    """The extraction, the labels of its points, and whether each file has colours that are not all 0."""
 
     extraction: TiledExtraction
     labels: Labels
+    colored: tuple[bool, ...]
 
 
 def points_for(memory: float) -> int:
@@ -178,7 +179,7 @@ def extract_in_tiles(
         tuple(warnings_of(clouds, seen, scene, cylinders)),
         tuple(blends) if config.verification.enabled and config.verification.blends else None,
     )
-    return Outcome(extraction, Labels(scratch, len(tree), ids))
+    return Outcome(extraction, Labels(scratch, len(tree), ids), seen.colored)
 
 
 def _run(

@@ -155,7 +155,7 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
         check_writable(name, overwrite=overwrite)
 
 
-def _mesh(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
+def mesh_bytes(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
     """Make the requested mesh, with remarks for its reader."""
     if job.mesh is None:
         return None, []
@@ -182,7 +182,7 @@ def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> list[str]
 
     content = Result.of(extraction)
     page, picture = _looks(job, extraction)
-    mesh, remarks = _mesh(job, content)
+    mesh, remarks = mesh_bytes(job, content)
     with all_or_none(overwrite=overwrite) as staged:
         result = staged(job.result)  # renamed last: if the result exists, the other outputs do too
         if job.annotated is not None:
