@@ -69,13 +69,23 @@ class Run:
             If the outputs cannot be written.
         """
         from cylx.cli.batch.found import report
-        from cylx.cli.batch.tiled import check_tiles, extract_tiled, needs_tiles, why_tiles
+        from cylx.cli.batch.tiled import TiledRun, check_tiles, extract_tiled, needs_tiles, why_tiles
 
         if needs_tiles(job.scan, self.tiles):
             if not self.tiles.certain:
-                check_tiles([job], self)
+                check_tiles([job], self.settings, self.selection)
                 self.messages.say(why_tiles(job.scan, self.tiles))
-            return extract_tiled(self, [job, *self.others])
+            how = TiledRun(
+                self.settings,
+                self.threads,
+                self.overwrite,
+                self.messages,
+                self.selection,
+                self.tiles,
+                self.processes,
+                self.resume,
+            )
+            return extract_tiled(how, [job, *self.others])
         from cylx.cli.terminal.display import Observers, observed
         from cylx.cli.terminal.startup import collect_rarely, import_numba_without_blas
 

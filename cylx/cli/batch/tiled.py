@@ -21,8 +21,10 @@ from cylx.errors import CylxError, InputError, UsageError
 from cylx.io.outputs import STANDARD_OUTPUT, STREAM
 
 if TYPE_CHECKING:
-    from cylx.cli.batch.run import Run
+    from cylx.cli.terminal.display import Messages
+    from cylx.config import Config
     from cylx.io import Scratch, StreamedCloud
+    from cylx.records import Selection
     from cylx.tiles.run import Options, Outcome
     from cylx.tiles.schedule import Runner, Work
 
@@ -34,6 +36,19 @@ UNKNOWN = 4_000_000_000
 """Memory that is assumed where the system does not say what is free, bytes."""
 MOST_DEATHS = 3
 """A task that takes so many processes with it is given up."""
+
+
+class TiledRun(NamedTuple):
+    """How a cloud in tiles is processed: what `Run` knows of it."""
+
+    settings: Config
+    threads: int | None
+    overwrite: bool
+    messages: Messages
+    selection: Selection
+    tiles: TileOptions
+    processes: int | None
+    resume: bool
 
 
 class Answer(NamedTuple):
@@ -57,7 +72,7 @@ def why_tiles(scan: str, tiles: TileOptions) -> str:
     return f"{needed:.2g} GB would be needed and {available:.2g} GB are there: the scan is cut into tiles"
 
 
-def check_tiles(jobs: Sequence[Job], run: Run) -> None:
+def check_tiles(jobs: Sequence[Job], settings: Config, selection: Selection) -> None:
     """Refuse what cannot be had from tiles, before anything is computed.
 
     Raises
@@ -74,7 +89,7 @@ def check_tiles(jobs: Sequence[Job], run: Run) -> None:
         "--rejected": any(job.rejected for job in jobs),
         "--report": any(job.report for job in jobs),
         "--png": any(job.picture for job in jobs),
-        "--voxel": run.selection.voxel is not None,
+        "--voxel": selection.voxel is not None,
     }
     for option, given in wanted.items():
         if given:
@@ -82,7 +97,7 @@ def check_tiles(jobs: Sequence[Job], run: Run) -> None:
     for job in jobs:
         if job.annotated is not None and not job.annotated.lower().endswith((".ply", ".las", ".laz")):
             raise UsageError(f"--annotated {job.annotated}", "does not work with tiles", "choose a name in .ply")
-    check_method(run.settings)
+    check_method(settings)
 
 
 def plan_one_cloud(
@@ -117,12 +132,12 @@ def plan_one_cloud(
     return first, tuple(jobs[1:])
 
 
-def extract_tiled(run: Run, jobs: Sequence[Job]) -> Finished:
+def extract_tiled(run: TiledRun, jobs: Sequence[Job]) -> Finished:
     """Extract the cylinders of one cloud in tiles, write them, and report them.
 
     Parameters
     ----------
-    run : Run
+    run : TiledRun
     jobs : sequence of Job
         The files of the cloud; the first has the name of the result.
 
@@ -232,7 +247,7 @@ def attempt(work: Work, number: int) -> Answer:
         return Answer(number, failure)
 
 
-def _streamed(job: Job, spool: Path, run: Run) -> StreamedCloud:
+def _streamed(job: Job, spool: Path, run: TiledRun) -> StreamedCloud:
     """Open a file of the cloud, and check that its annotated cloud can be written."""
     from cylx.io import check_annotated, stream_cloud
 
@@ -242,7 +257,7 @@ def _streamed(job: Job, spool: Path, run: Run) -> StreamedCloud:
     return cloud
 
 
-def _scratch_of(run: Run, jobs: Sequence[Job], options: Options) -> AbstractContextManager[Scratch]:
+def _scratch_of(run: TiledRun, jobs: Sequence[Job], options: Options) -> AbstractContextManager[Scratch]:
     """Open the scratch folder of a cloud."""
     from cylx.io import open_scratch, sha256_of
     from cylx.results.parts import Input
