@@ -87,7 +87,7 @@ class TiledExtraction:
 
     def __repr__(self) -> str:
         found = counted(len(self.cylinders), len(self.blends or ()))
-        return f"{found} in {sum(self.rows)} points in {self.tiling.count} tiles"
+        return f"{found} in {sum(self.rows)} points in {self.tiling.count} tile{'s' * (self.tiling.count != 1)}"
 
     def to_arrays(self) -> dict[str, NDArray[Any]]:
         """Return the cylinders as arrays, in their order; see `Extraction.to_arrays`."""
