@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Protocol
 
-from cylx.errors import UsageError
+from cylx.errors import InputError, UsageError
 from cylx.optional.extras import require
 
 Work = Callable[[int], int]
@@ -57,7 +58,7 @@ class Cluster:
 
     def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Iterator[tuple[int, int]]:
         """Yield the number and the answer of each task as it is done; a task whose worker dies is done by another."""
-        from distributed import wait  # noqa: PLC0415  an extra
+        from distributed import KilledWorker, wait  # noqa: PLC0415  an extra
 
         shared = self._client.scatter(work, broadcast=True)
         futures = {self._client.submit(_call, shared, number, pure=False): number for number in numbers}
@@ -65,11 +66,17 @@ class Cluster:
             while futures:
                 waited()
                 try:
-                    done, _ = wait(list(futures), timeout=_LOOK_UP, return_when="FIRST_COMPLETED")
-                except TimeoutError:
+                    with self._client.as_current():
+                        done, _ = wait(list(futures), timeout=_LOOK_UP, return_when="FIRST_COMPLETED")
+                except (TimeoutError, asyncio.TimeoutError):  # the same since Python 3.11
                     continue
                 for future in done:
-                    yield futures.pop(future), future.result()
+                    number = futures.pop(future)
+                    try:
+                        yield number, future.result()
+                    except KilledWorker as error:
+                        fault = "every worker that took it died, as when memory runs out"
+                        raise InputError(f"tile {number}", fault, "give less by --memory") from error
         finally:
             self._client.cancel(list(futures))
 

@@ -94,9 +94,6 @@ def test_several_files_are_one_cloud(run_cylx, tmp_path, points):
     result = json.loads((site / "site.cylinders.json").read_text())
     files = [(one["file"], one["format"]) for one in result["input"]["files"]]
     assert files == [("east.las", "las"), ("west.las", "las")]
-        ("east.las", "las"),
-        ("west.las", "las"),
-    ]
     assert result["input"]["points"] == len(points)
     (one,) = result["cylinders"]
     assert one["height"] == pytest.approx(6.0, abs=0.05)
