@@ -31,6 +31,8 @@ OVERHEAD = 1.6
 """Points of a tile with its margin over those without, at the most, usually."""
 LEAST_POINTS, MOST_POINTS = 20_000, 8_000_000
 """A tile of fewer points is hardly worth its margin; more give no better tiles."""
+LEAST_MEMORY = BASE + OVERHEAD * A_POINT * LEAST_POINTS
+"""For the search of a tile, bytes."""
 THINNED = 1 << 18
 """Points in which cylinders larger than tiles are looked for, at the most."""
 LARGE = 0.25
@@ -75,12 +77,10 @@ def points_for(memory: float) -> int:
     UsageError
         If it is too little for any tile.
     """
-    points = int((memory - BASE) / A_POINT / OVERHEAD)
-    if points < LEAST_POINTS:
-        least = BASE + OVERHEAD * A_POINT * LEAST_POINTS
-        fault = f"{memory / 1e9:.2g} GB for each process are too little"
-        raise UsageError("--memory", fault, f"give at least {least / 1e9:.2g} GB for each")
-    return min(points, MOST_POINTS)
+    if memory < LEAST_MEMORY:
+        fault = f"{memory / 1e9:.2g} GB for a tile are too little"
+        raise UsageError("memory", fault, f"give at least {LEAST_MEMORY / 1e9:.2g} GB")
+    return min(int((memory - BASE) / A_POINT / OVERHEAD), MOST_POINTS)
 
 
 def check_method(config: Config) -> None:

@@ -140,7 +140,7 @@ def test_methods_that_cannot_be_joined_are_refused():
 
 
 def test_too_little_memory_is_refused():
-    with pytest.raises(UsageError, match=r"^--memory: 0\.1 GB for each process are too little; give at least"):
+    with pytest.raises(UsageError, match=r"^memory: 0\.1 GB for a tile are too little; give at least"):
         points_for(1e8)
     assert points_for(1e12) == points_for(1e11)
 

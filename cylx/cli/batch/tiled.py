@@ -28,12 +28,10 @@ if TYPE_CHECKING:
     from cylx.tiles.run import Options, Outcome
     from cylx.tiles.schedule import Runner, Work
 
-SHARE_OF_FREE = 0.75
-"""Share of the free memory that is used for tiles."""
+OF_TILE, SHARE_OF_TILE = 1_000_000_000, 0.4
+"""Memory for the search of one tile, bytes, or this share of what there is if that is less: two have room then."""
 OWN = 400_000_000
 """Memory that this process needs beside those that search tiles, bytes."""
-UNKNOWN = 4_000_000_000
-"""Memory that is assumed where the system does not say what is free, bytes."""
 MOST_DEATHS = 3
 """A task that takes so many processes with it is given up."""
 
@@ -179,14 +177,31 @@ def extract_tiled(run: TiledRun, jobs: Sequence[Job]) -> Finished:
 
 
 def options_of(tiles: TileOptions, processes: int | None, threads: int | None) -> Options:
-    """Return how to cut: as large as the memory of each process allows."""
-    from cylx.tiles.run import Options
+    """Return how to cut: the size of the tiles must not depend on what is free, nor on the number of processes.
 
-    total = tiles.memory or SHARE_OF_FREE * (free_memory() or UNKNOWN)
-    count = processes or 1
-    each = total if processes is None and tiles.scheduler is None else (total - OWN) / count
+    Raises
+    ------
+    UsageError
+        If the memory is too little for any tile.
+    """
+    from cylx.tiles.run import LEAST_MEMORY, Options
+
+    share = 1.0 if tiles.scheduler is not None else SHARE_OF_TILE
+    if tiles.memory is not None and share * tiles.memory < LEAST_MEMORY:
+        least = LEAST_MEMORY / share / 1e9
+        raise UsageError("--memory", f"{tiles.memory / 1e9:.2g} GB are too little", f"give at least {least:.2g} GB")
+    each = float(OF_TILE)
+    if tiles.memory is not None:
+        each = float(tiles.memory) if tiles.scheduler is not None else min(each, share * tiles.memory)
     size = None if tiles.size in (None, AUTO) else tiles.size
-    return Options(size, tiles.buffer, each, threads or max(1, cores() // count))
+    return Options(size, tiles.buffer, each, threads or max(1, cores() // (processes or 1)))
+
+
+def processes_for(tiles: TileOptions, processes: int, each: float) -> int:
+    """Return how many processes the memory allows."""
+    if tiles.memory is None:
+        return processes
+    return max(1, min(processes, int((tiles.memory - OWN) / each)))
 
 
 @contextmanager
@@ -198,7 +213,7 @@ def runner_of(tiles: TileOptions, processes: int | None, memory: float) -> Itera
         with closing(Cluster(tiles.scheduler)) as cluster:
             yield cluster
     else:
-        yield Here() if processes is None else Processes(processes, memory)
+        yield Here() if processes is None else Processes(processes_for(tiles, processes, memory), memory)
 
 
 class Processes:
