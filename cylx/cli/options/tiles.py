@@ -129,7 +129,7 @@ _OPTIONS: tuple[Callable[[Any], Any], ...] = (
         "--memory",
         type=Memory(),
         metavar="SIZE",
-        help="Memory for tiles, all processes together, such as 4GB; with --scheduler that of one.  [default: 1 GB each]",
+        help="Memory for all processes together, such as 4GB; with --scheduler for each.  [default: 1 GB each]",
     ),
     click.option(
         "--scratch",
