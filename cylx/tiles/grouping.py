@@ -18,7 +18,7 @@ from cylx.tiles.search import WHOLE, Plan
 def write_groups(plan: Plan, found: dict[int, dict[str, Any]], scene: Scene) -> list[int]:
     """Tell which parts have to be joined, and write them down; return the numbers of their groups."""
     scratch = plan.scratch
-    parts = [Part.of_object(one) for tile in sorted(found) for one in found[tile]["parts"]]
+    parts: list[Part] = [one for tile in sorted(found) for one in found[tile]["parts"]]
     tiles = [tile for tile in sorted(found) for _ in found[tile]["parts"]]
     alone: list[Part] = []
     joint: dict[str, Any] = {}

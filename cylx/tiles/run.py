@@ -22,7 +22,7 @@ from cylx.tiles.join import join_group
 from cylx.tiles.label import Labels, label_tile
 from cylx.tiles.results import in_order, joining_report, scene_of, stages_of, warnings_of, write_finals
 from cylx.tiles.schedule import Runner
-from cylx.tiles.search import WHOLE, Plan, found_name, points_name, search_tile
+from cylx.tiles.search import WHOLE, Plan, found_in, points_name, search_tile
 from cylx.tiles.tree import usual_side
 
 BASE, A_POINT = 300_000_000, 220
@@ -154,7 +154,7 @@ def extract_in_tiles(
         few = seen.sample[:: -(-len(seen.sample) // THINNED)]  # they were drawn: any of them are spread evenly
         scratch.append(points_name(WHOLE), few)
     _run(runner, search_tile, plan, [*whole, *tiles], "tiles", observer)
-    found = {tile: scratch.read_json(found_name(tile)) for tile in [*tiles, *whole]}
+    found = {tile: found_in(scratch, tile) for tile in [*tiles, *whole]}
     scene = scene_of([found[tile] for tile in tiles], extent, config)
     groups = write_groups(plan, found, scene)
     _run(runner, gather_tile, plan, tiles if groups else [], "gathering", observer)

@@ -126,6 +126,13 @@ def search_tile(plan: Plan, tile: int) -> int:
     return len(parts)
 
 
+def found_in(scratch: Scratch, tile: int) -> dict[str, Any]:
+    """Return what was written of a tile, with its parts as such: as plain data they take ten times the memory."""
+    content: dict[str, Any] = scratch.read_json(found_name(tile))
+    content["parts"] = [Part.of_object(one) for one in content["parts"]]
+    return content
+
+
 def _config_of(plan: Plan, tile: int) -> Config:
     """Return the configuration of a tile: with a seed of its own, and as many cylinders as there are."""
     seed = int(np.random.SeedSequence([plan.config.seed, tile + 1]).generate_state(1)[0])
