@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cylx.api import read_result as read_result
     from cylx.api import to_dataframe as to_dataframe
     from cylx.api import to_dict as to_dict
+    from cylx.api.tiled import extract_tiled as extract_tiled
     from cylx.config import Config as Config
     from cylx.config import load_config as load_config
     from cylx.errors import CylxError as CylxError
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from cylx.records import Extraction as Extraction
     from cylx.records import PointCloud as PointCloud
     from cylx.records import RejectedFit as RejectedFit
+    from cylx.records import TiledExtraction as TiledExtraction
     from cylx.report import plot_radii as plot_radii
     from cylx.report import plot_residuals as plot_residuals
     from cylx.report import plot_scene as plot_scene
@@ -45,9 +47,11 @@ _HOMES = {
     "PointCloud": "cylx.records",
     "RejectedFit": "cylx.records",
     "Result": "cylx.results",
+    "TiledExtraction": "cylx.records",
     "compare": "cylx.evaluation",
     "evaluate": "cylx.api",
     "extract": "cylx.api",
+    "extract_tiled": "cylx.api.tiled",
     "fit_cylinder": "cylx.pipeline.segmented",
     "load_config": "cylx.config",
     "plot_radii": "cylx.report",

@@ -18,6 +18,7 @@ from cylx.pipeline import candidates, rounds
 from cylx.records import Scene
 from cylx.scene import priors, resolve
 from cylx.stages import averaging, clustering, curvature, local_slices, patches, rims, verification
+from cylx.tiles import results as tile_results
 from tests.support.docs_tables import PACKAGE, TABLES, TOLD, commands, config_keys, config_sections, options_of
 
 ROOT = PACKAGE.parent
@@ -186,6 +187,7 @@ def test_every_stage_is_told_of_with_its_reasons():
     rows = rows_of(part(page, "## The stages"))[1:]
     told = {row[0].strip("`"): row[3] + (rejected if "](#the-rejected)" in row[3] else "") for row in rows}
     source = "".join(inspect.getsource(module) for module in (candidates, rounds, curvature, patches, rims, clustering))
+    source += inspect.getsource(tile_results)
     assert set(told) == set(re.findall(r'(?:\.report|StageReport)\("([a-z ]+)"', source))
     reasons = {("curvature", reason) for reason in curvature.OUTCOMES[:-1]}
     reasons |= {("patches", reason) for reason in patches.OUTCOMES[:-1]}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -13,11 +14,13 @@ from cylx.cli.batch.options import BatchOptions, made_folder
 from cylx.cli.options.batch import with_batch_options
 from cylx.cli.options.configuration import complete_files, configured, debug_option, overwrite_option, with_messages
 from cylx.cli.options.selection import selecting
+from cylx.cli.options.tiles import TileOptions, with_tile_options
 from cylx.cli.options.units import units_option
 from cylx.cli.terminal.group import ExampleCommand
 
 if TYPE_CHECKING:
     from cylx.cli.batch.batch import Batch
+    from cylx.cli.batch.jobs import Job
     from cylx.cli.terminal.display import Messages
     from cylx.config import Config
     from cylx.records import Selection
@@ -83,6 +86,7 @@ if TYPE_CHECKING:
     help="Write seconds per stage and peak memory as JSON.",
 )
 @with_batch_options
+@with_tile_options
 @overwrite_option
 @with_messages
 @debug_option
@@ -103,6 +107,7 @@ def extract(
     require: int | None,
     profile: str | None,
     options: BatchOptions,
+    tiles: TileOptions,
     overwrite: bool,
     messages: Messages,
 ) -> None:
@@ -119,15 +124,28 @@ def extract(
 
     output = options.output(output)
     found = find_scans(scans, recursive=options.recursive)
-    jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png, mesh, units)
+    others: tuple[Job, ...] = ()
+    if tiles.one_cloud:
+        from cylx.cli.batch.tiled import plan_one_cloud
+
+        first, others = plan_one_cloud(found, output, annotate, mesh, units)
+        jobs = [replace(first, annotated=annotated or first.annotated, rejected=rejected, report=report, picture=png)]
+    else:
+        jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png, mesh, units)
     check_meshes([job.mesh for job in jobs if job.mesh is not None], units)
-    summaries, extras = options.summaries(output, found), [] if profile is None else [profile]
+    summaries = options.summaries(output, [job.scan for job in jobs])
+    extras = [*(name for name in [profile] if name is not None), *(job.annotated for job in others if job.annotated)]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])
     run = Run(settings, threads, require, overwrite or options.resume, messages, selection)
+    run = replace(run, tiles=tiles, processes=options.tile_processes(), resume=options.resume, others=others)
+    if tiles.certain:
+        from cylx.cli.batch.tiled import check_tiles
+
+        check_tiles([*jobs, *others], settings, selection)
     batch = Batch(run, jobs, options, summaries)
     with made_folder(output):
         check_outputs(jobs, [], overwrite=overwrite or options.resume)
-        check_outputs([], extras, overwrite=overwrite)
+        check_outputs([], extras, overwrite=overwrite or (options.resume and profile is None))
         batch.check(overwrite=overwrite)
         if png is not None:
             from cylx.report import check_pictures

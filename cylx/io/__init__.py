@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from cylx.io.annotated import check_annotated as check_annotated
     from cylx.io.annotated import las_obstacle as las_obstacle
     from cylx.io.annotated import write_annotated as write_annotated
+    from cylx.io.annotated import write_annotated_stream as write_annotated_stream
     from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
     from cylx.io.clouds import recorded_name as recorded_name
@@ -26,12 +27,19 @@ if TYPE_CHECKING:
     from cylx.io.outputs import check_writable as check_writable
     from cylx.io.outputs import write_bytes as write_bytes
     from cylx.io.outputs import write_text as write_text
+    from cylx.io.scratch import Scratch as Scratch
+    from cylx.io.scratch import open_scratch as open_scratch
     from cylx.io.sizes import expected_points as expected_points
     from cylx.io.staging import remove_leftovers as remove_leftovers
     from cylx.io.staging import temporary_beside as temporary_beside
+    from cylx.io.streamed import StreamedCloud as StreamedCloud
+    from cylx.io.streamed import stream_arrays as stream_arrays
+    from cylx.io.streamed import stream_cloud as stream_cloud
 
 _HOMES = {
     "LAS_SUFFIXES": "cylx.io.formats",
+    "Scratch": "cylx.io.scratch",
+    "StreamedCloud": "cylx.io.streamed",
     "check_annotated": "cylx.io.annotated",
     "check_writable": "cylx.io.outputs",
     "cloud_name": "cylx.io.formats",
@@ -39,6 +47,7 @@ _HOMES = {
     "cloud_suffixes": "cylx.io.clouds",
     "expected_points": "cylx.io.sizes",
     "las_obstacle": "cylx.io.annotated",
+    "open_scratch": "cylx.io.scratch",
     "printable": "cylx.io.inputs",
     "read_cloud": "cylx.io.clouds",
     "read_json": "cylx.io.inputs",
@@ -46,8 +55,11 @@ _HOMES = {
     "recorded_name": "cylx.io.clouds",
     "remove_leftovers": "cylx.io.staging",
     "sha256_of": "cylx.io.inputs",
+    "stream_arrays": "cylx.io.streamed",
+    "stream_cloud": "cylx.io.streamed",
     "temporary_beside": "cylx.io.staging",
     "write_annotated": "cylx.io.annotated",
+    "write_annotated_stream": "cylx.io.annotated",
     "write_bytes": "cylx.io.outputs",
     "write_cloud": "cylx.io.clouds",
     "write_text": "cylx.io.outputs",

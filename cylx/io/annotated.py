@@ -22,11 +22,14 @@ from cylx.io.staging import known_name
 from cylx.palette import cylinder_colors
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping
 
     from numpy.typing import NDArray
 
+    from cylx.io.streamed import StreamedCloud
     from cylx.records import Extraction, PointCloud
+
+    Labelled = Iterable[tuple[NDArray[np.int32], NDArray[np.float32]]]
 
 _TRIED = 3
 _MOST_STEPS = 4.0
@@ -68,7 +71,7 @@ def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool
         if suffix in LAS_SUFFIXES:
             _write_las(file, extraction, compressed=suffix == ".laz")
             return
-        kept = _kept(cloud)
+        kept = _kept(None if cloud.table is None else cloud.table.dtype)
         dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OURS.items()])
         if suffix == ".pcd":
             write_pcd(file, np.concatenate([*_blocks(extraction, kept, dtype)]))
@@ -121,7 +124,7 @@ def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
     header, table, suffix = cloud.source.header, cloud.table, Path(path).suffix.lower()
     if suffix not in LAS_SUFFIXES or header is None or table is None:
         return ""
-    from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
+    from cylx.io.las_annotated import has_colors, write_las  # noqa: PLC0415  needs an extra, or for this alone
 
     scales, offsets = struct.unpack_from("<3d", header, 131), struct.unpack_from("<3d", header, 155)
     for axis, scale, offset in zip("xyz", scales, offsets, strict=True):
@@ -129,8 +132,9 @@ def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
             return f"the steps of {axis}, {scale:g}, are lost so far from the origin"
     few = table[:_TRIED]
     ours = {name: np.zeros(len(few), kind) for name, kind in _OURS.items()}
+    compressed, colored = suffix == ".laz", has_colors(few)
     try:
-        write_las(io.BytesIO(), header, few, [(slice(0, len(few)), ours)], compressed=suffix == ".laz")
+        write_las(io.BytesIO(), header, len(few), [(few, ours)], colored=colored, compressed=compressed)
     except MemoryError:
         raise
     except Exception as error:  # noqa: BLE001  laspy raises whatever it meets
@@ -139,11 +143,11 @@ def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
     return ""
 
 
-def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:
+def _kept(dtype: np.dtype[np.void] | None) -> dict[str, tuple[str, np.dtype[Any]]]:
     """Return the output name and type of each property of the input, by its input name."""
-    if cloud.table is None:
+    if dtype is None:
         return {axis: (axis, np.dtype("<f8")) for axis in "xyz"}
-    names = cloud.table.dtype.names or ()
+    names = dtype.names or ()
     mended = mended_names(names)
     taken = {*mended, *_OURS}
     colored = {"red", "green", "blue"} <= set(mended)
@@ -154,7 +158,7 @@ def _kept(cloud: PointCloud) -> dict[str, tuple[str, np.dtype[Any]]]:
             while renamed in taken:
                 renamed = f"orig_{renamed}"
             taken.add(renamed)
-        kept[name] = (renamed, ply_type(cloud.table.dtype[name]))
+        kept[name] = (renamed, ply_type(dtype[name]))
     return kept
 
 
@@ -170,12 +174,7 @@ def _blocks(
 ) -> Iterator[NDArray[np.void]]:
     columns = _columns(extraction.cloud)
     for part, ours in _findings(extraction):
-        block = np.empty(len(ours["cylinder_id"]), dtype)
-        for name, (new, _) in kept.items():
-            block[new] = columns[name][part]
-        for name, values in ours.items():
-            block[name] = values
-        yield block
+        yield _block({name: columns[name][part] for name in kept}, ours, kept, dtype)
 
 
 def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray[Any]]]]:
@@ -185,24 +184,96 @@ def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray
     residuals = cloud.spread(extraction.residuals, np.nan)
     for start in range(0, cloud.rows, ROWS_AT_A_TIME):
         part = slice(start, start + ROWS_AT_A_TIME)
-        ids = labels[part]
-        colors = cylinder_colors(ids).T
-        found = {"cylinder_id": ids, "residual": np.where(ids < 0, np.nan, residuals[part])}
-        yield part, found | dict(zip(("red", "green", "blue"), colors, strict=True))
+        yield part, _ours(labels[part], residuals[part])
+
+
+def _ours(ids: NDArray[np.int32], residuals: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
+    """Return our properties of some rows, by name."""
+    found = {"cylinder_id": ids, "residual": np.where(ids < 0, np.float32(np.nan), residuals)}
+    return found | dict(zip(("red", "green", "blue"), cylinder_colors(ids).T, strict=True))
+
+
+def write_annotated_stream(
+    path: str | Path, cloud: StreamedCloud, labelled: Labelled, *, colored: bool, overwrite: bool = False
+) -> None:
+    """Write a cloud that need not fit into memory again, as `write_annotated` does.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file whose name ends in .ply, .las or .laz.
+    cloud : StreamedCloud
+    labelled : iterable of (ndarray, ndarray)
+        Cylinder and residual of the rows, in pieces as the cloud has them.
+    colored : bool
+        Whether the points have colours that are not all 0.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the file exists and may not be replaced, cannot be written, or has a format that cannot hold the points.
+    """
+    suffix = Path(path).suffix.lower()
+    pieces = ((table, _ours(*ours)) for table, ours in zip(cloud.parts(), labelled, strict=True))
+    with open_output(path, overwrite=overwrite) as file:
+        if suffix in LAS_SUFFIXES:
+            _write_las_pieces(
+                file, cloud.source.header, cloud.rows, pieces, colored=colored, compressed=suffix == ".laz"
+            )
+            return
+        kept = _kept(None if cloud.bare else cloud.dtype)
+        dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OURS.items()])
+        write_ply(file, dtype, cloud.rows, (_block(table, ours, kept, dtype) for table, ours in pieces))
+
+
+def _block(
+    columns: Mapping[str, NDArray[Any]] | NDArray[np.void],
+    ours: dict[str, NDArray[Any]],
+    kept: dict[str, tuple[str, np.dtype[Any]]],
+    dtype: np.dtype[np.void],
+) -> NDArray[np.void]:
+    """Return rows of the output."""
+    block = np.empty(len(ours["cylinder_id"]), dtype)
+    for name, (new, _) in kept.items():
+        block[new] = columns[name]
+    for name, values in ours.items():
+        block[name] = values
+    return block
 
 
 def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> None:
+    """Write the points of a cloud that is in memory as LAS or LAZ."""
+    from cylx.io.las_annotated import has_colors  # noqa: PLC0415  needs an extra, or for this alone
+
+    cloud = extraction.cloud
+    table = cloud.table
+    if table is None:
+        raise ValueError("only clouds from LAS and LAZ can be written as such")
+    pieces = ((table[part], ours) for part, ours in _findings(extraction))
+    _write_las_pieces(file, cloud.source.header, len(table), pieces, colored=has_colors(table), compressed=compressed)
+
+
+def _write_las_pieces(
+    file: BinaryIO,
+    header: bytes | None,
+    count: int,
+    pieces: Iterator[tuple[NDArray[np.void], dict[str, NDArray[Any]]]],
+    *,
+    colored: bool,
+    compressed: bool,
+) -> None:
     """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek, or has to be read again."""
     from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
     from cylx.io.las_mend import has_letters  # noqa: PLC0415  for this alone
 
-    header, table = extraction.cloud.source.header, extraction.cloud.table
-    if header is None or table is None:
+    if header is None:
         raise ValueError("only clouds from LAS and LAZ can be written as such")
     if file.seekable() and not has_letters(header):
-        write_las(file, header, table, _findings(extraction), compressed=compressed)
+        write_las(file, header, count, pieces, colored=colored, compressed=compressed)
         return
     with tempfile.TemporaryFile() as copy:
-        write_las(copy, header, table, _findings(extraction), compressed=compressed)
+        write_las(copy, header, count, pieces, colored=colored, compressed=compressed)
         copy.seek(0)
         shutil.copyfileobj(copy, file)

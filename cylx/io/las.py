@@ -67,8 +67,7 @@ def read_las(source: Input, *, allocate: Allocate = np.empty) -> NDArray[np.void
         If this is not LAS, is damaged or shorter than its header says, or laspy or lazrs is not installed.
     """
     facts = las_header(source)
-    libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
-    require(*libraries, place=source.place, needed_by="", error=InputError)
+    require(*libraries_for(facts), place=source.place, needed_by="", error=InputError)
     with quiet_laspy(), _told_apart(source.place):
         return _read(source, facts, allocate)
 
@@ -99,6 +98,46 @@ def quiet_laspy() -> Iterator[None]:
 
 
 def _read(source: Input, facts: LasFacts, allocate: Allocate) -> NDArray[np.void]:
+    table, done = None, 0
+    for part in _parts(source, facts):
+        if table is None:
+            table = allocate(facts.points, part.dtype)
+        table[done : done + len(part)] = part
+        done += len(part)
+    if table is None or done < facts.points:
+        raise short_of_points(source.place, facts.points, done)
+    return table
+
+
+def las_parts(source: Input) -> Iterator[NDArray[np.void]]:
+    """Yield the table of `read_las` piece by piece, so that no more than a piece is in memory.
+
+    Parameters
+    ----------
+    source : Input
+
+    Raises
+    ------
+    InputError
+        If this is not LAS, is damaged or shorter than its header says, or laspy or lazrs is not installed.
+    """
+    facts, done = las_header(source), 0
+    require(*libraries_for(facts), place=source.place, needed_by="", error=InputError)
+    with quiet_laspy(), _told_apart(source.place):
+        for part in _parts(source, facts):
+            done += len(part)
+            yield part
+    if done < facts.points:
+        raise short_of_points(source.place, facts.points, done)
+
+
+def libraries_for(facts: LasFacts) -> tuple[str, ...]:
+    """Return the libraries that a file needs."""
+    return ("laspy", "lazrs") if facts.compressed else ("laspy",)
+
+
+def _parts(source: Input, facts: LasFacts) -> Iterator[NDArray[np.void]]:
+    """Yield the points in pieces."""
     import laspy  # noqa: PLC0415  an extra
 
     file = _mended_file(source, facts)
@@ -111,18 +150,13 @@ def _read(source: Input, facts: LasFacts, allocate: Allocate) -> NDArray[np.void
         header = reader.header
         columns = las_dimensions(header.point_format)
         types = [*((axis, np.dtype("f8")) for axis in "xyz"), *((one.name, one.type) for one in columns)]
-        table = allocate(facts.points, np.dtype(types))
-        done = 0
         for chunk in reader.chunk_iterator(min(_CHUNK, max(_BUFFER // header.point_format.size, 1))):
-            part = table[done : done + len(chunk)]
-            done += len(chunk)
+            part = np.empty(len(chunk), np.dtype(types))
             for axis, scale, offset in zip("xyz", header.scales, header.offsets, strict=True):
                 part[axis] = chunk[axis.upper()] * np.float64(scale) + np.float64(offset)
             for one in columns:
                 part[one.name] = one.of(np.asarray(chunk[one.dimension]))
-    if done < facts.points:
-        raise short_of_points(source.place, facts.points, done)
-    return table
+            yield part
 
 
 def _mended_file(source: Input, facts: LasFacts) -> BinaryIO:

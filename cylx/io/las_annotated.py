@@ -26,9 +26,10 @@ _NO_DATE = date(1970, 1, 1)
 def write_las(
     file: BinaryIO,
     kept: bytes,
-    table: NDArray[np.void],
-    blocks: Iterable[tuple[slice, dict[str, NDArray[Any]]]],
+    count: int,
+    blocks: Iterable[tuple[NDArray[np.void], dict[str, NDArray[Any]]]],
     *,
+    colored: bool,
     compressed: bool,
 ) -> None:
     """Write the points of a LAS file again, with the cylinder of each.
@@ -42,22 +43,23 @@ def write_las(
         A file that can seek.
     kept : bytes
         The rest of the input file, see `kept_header`.
-    table : ndarray of shape (points,), structured
-        The points as read.
-    blocks : iterable of (slice, mapping)
-        `cylinder_id`, `residual`, `red`, `green` and `blue` of the points, piece by piece.
+    count : int
+        Number of points.
+    blocks : iterable of (ndarray, mapping)
+        The points as read, and their `cylinder_id`, `residual`, `red`, `green` and `blue`, piece by piece.
+    colored : bool
+        Whether the points have colours that are not all 0.
     compressed : bool
         Whether to write LAZ.
     """
     import laspy  # noqa: PLC0415  an extra
 
     with quiet_laspy():
-        header = laspy.LasHeader.read_from(io.BytesIO(mended(kept, len(table))), read_evlrs=True)
+        header = laspy.LasHeader.read_from(io.BytesIO(mended(kept, count)), read_evlrs=True)
         columns = las_dimensions(header.point_format)
-        renamed = _prepare(header, table)
+        renamed = _prepare(header, colored=colored)
         with laspy.open(file, mode="w", header=header, closefd=False, do_compress=compressed) as writer:
-            for part, ours in blocks:
-                rows = table[part]
+            for rows, ours in blocks:
                 record = laspy.ScaleAwarePointRecord.zeros(len(rows), header=header)
                 for axis, scale, offset in zip("xyz", header.scales, header.offsets, strict=True):
                     record[axis.upper()] = np.rint((rows[axis] - offset) / scale).astype("i4")
@@ -76,7 +78,7 @@ def write_las(
         restore(file, kept)
 
 
-def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: ANN401  (of laspy)
+def _prepare(header: Any, *, colored: bool) -> dict[str, str]:  # noqa: ANN401  (of laspy)
     """Add our dimensions to a header, and return the new names of dimensions, those of colours under `red+`."""
     import laspy  # noqa: PLC0415  an extra
 
@@ -88,7 +90,7 @@ def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: A
             renamed[one.name] = _new_name(one.name, taken)
             point_format.dimensions[place] = one._replace(name=renamed[one.name])
     params = [laspy.ExtraBytesParams(name, kind) for name, kind in _OURS.items()]
-    if _is_colored(header) and any(table[color].any() for color in _COLORS):
+    if _is_colored(header) and colored:
         renamed |= {f"{color}+": _new_name(color, taken) for color in _COLORS}
         params += [laspy.ExtraBytesParams(renamed[f"{color}+"], "u2") for color in _COLORS]
     header.add_extra_dims(params)
@@ -98,6 +100,12 @@ def _prepare(header: Any, table: NDArray[np.void]) -> dict[str, str]:  # noqa: A
     header.start_of_waveform_data_packet_record = 0
     header.global_encoding.waveform_data_packets_internal = False
     return renamed
+
+
+def has_colors(table: NDArray[np.void]) -> bool:
+    """Return whether points have colours that are not all 0."""
+    names = table.dtype.names or ()
+    return all(color in names for color in _COLORS) and any(bool(table[color].any()) for color in _COLORS)
 
 
 def _version(header: Any) -> Any:  # noqa: ANN401  (of laspy)

@@ -70,7 +70,7 @@ def read_npy(source: Input) -> NDArray[np.void]:
     """
     head = source.head(6)
     if head == _NPY:
-        return _columns(_mapped(source), source.place)
+        return columns_of(map_npy(source), source.place)
     if head[:4] == _ZIP:
         return _read_packed(source)
     raise InputError(source.place, "is neither NPY nor NPZ", "give it its right suffix")
@@ -84,7 +84,7 @@ def _read_packed(source: Input) -> NDArray[np.void]:
             part = Input(source.place, copy, size, source.sha256)
             if part.head(6) != _NPY:
                 raise InputError(source.place, "holds a member that is not NPY", "save it again by numpy.savez")
-            return _columns(_mapped(part), source.place)
+            return columns_of(map_npy(part), source.place)
     except _DAMAGED as error:
         fault = f"is not a complete NPZ: {_shortened(error)}"
         raise InputError(source.place, fault, "get a complete copy of the file") from None
@@ -101,8 +101,18 @@ def _member(names: list[str], place: str) -> str:
     return arrays[0]
 
 
-def _mapped(source: Input) -> NDArray[Any]:
-    """Map an array from its file, after its header has been checked against the file size."""
+def map_npy(source: Input) -> NDArray[Any]:
+    """Map an array from its file, after its header has been checked against the file size.
+
+    Parameters
+    ----------
+    source : Input
+
+    Raises
+    ------
+    InputError
+        If it is damaged, or holds no points.
+    """
     head = io.BytesIO(source.head(_ENOUGH))
     try:
         with warnings.catch_warnings():
@@ -155,8 +165,16 @@ def _shortened(error: BaseException) -> str:
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
 
 
-def _columns(array: NDArray[Any], place: str) -> NDArray[np.void]:
-    """Return an array as a structured array of plain columns, without copying if possible."""
+def columns_of(array: NDArray[Any], place: str) -> NDArray[np.void]:
+    """Return an array as a structured array of plain columns, without copying if possible.
+
+    Parameters
+    ----------
+    array : ndarray
+        Of numbers in columns, or structured.
+    place : str
+        Its name in errors.
+    """
     if array.dtype.names is None:
         names = ["x", "y", "z", *(f"column_{column}" for column in range(4, array.shape[1] + 1))]
         kind = _plain(array.dtype)

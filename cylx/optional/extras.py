@@ -33,6 +33,7 @@ LIBRARIES = {
     "OCP": Library("step", "export of STEP"),
     "ifcopenshell": Library("ifc", "export of IFC"),
     "ezdxf": Library("dxf", "export of DXF"),
+    "distributed": Library("dask", "clusters"),
     "pandas": Library("dataframe", "data frames"),
 }
 """Optional libraries by import name."""

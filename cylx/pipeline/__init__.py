@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from cylx.config import Config
 from cylx.pipeline.assembly import assemble
 from cylx.pipeline.candidates import (
@@ -15,11 +17,44 @@ from cylx.pipeline.candidates import (
 )
 from cylx.pipeline.rounds import Rounds
 from cylx.pipeline.stage_log import StageLog
-from cylx.records import Candidates, Extraction, IndexedCloud, Observer, PointCloud, SilentObserver
-from cylx.scene import prepare
+from cylx.records import (
+    Candidates,
+    Extraction,
+    Finding,
+    IndexedCloud,
+    Observer,
+    PointCloud,
+    RejectedSegment,
+    SilentObserver,
+)
+from cylx.scene import Prepared, prepare
 from cylx.stages.clustering import CandidateGame
 
-__all__ = ["extract_cylinders"]
+__all__ = ["Search", "extract_cylinders", "search_cylinders"]
+
+
+class Search(NamedTuple):
+    """What was found in a cloud, in its frame, before the points are labelled.
+
+    Parameters
+    ----------
+    indexed : IndexedCloud
+        The cloud, and what its points lie on.
+    windows : Candidates
+        What a cylinder should agree with.
+    findings : list of Finding
+        The cylinders, the most trusted first.
+    blends : list of Finding
+        The arcs that go on tangentially, the most trusted first.
+    rejected : list of RejectedSegment
+        What was not accepted, in the order it came.
+    """
+
+    indexed: IndexedCloud
+    windows: Candidates
+    findings: list[Finding]
+    blends: list[Finding]
+    rejected: list[RejectedSegment]
 
 
 def extract_cylinders(
@@ -55,6 +90,24 @@ def extract_cylinders(
         from cylx.pipeline.competitors import extract_by_competitor  # noqa: PLC0415  brings scipy.spatial: 0.3 s
 
         return extract_by_competitor(prepared, log)
+    found = search_cylinders(prepared, log)
+    with log.stage("labelling"):
+        return assemble(prepared, found.indexed, found.findings, found.rejected, log.reports, found.blends)
+
+
+def search_cylinders(prepared: Prepared, log: StageLog) -> Search:
+    """Search a prepared cloud by the clustering game.
+
+    Parameters
+    ----------
+    prepared : Prepared
+    log : StageLog
+        Is told of stages, their times and counts.
+
+    Returns
+    -------
+    Search
+    """
     with log.stage("curvature"):
         windows, explained = windows_and_explained(prepared, log)
     with log.stage("patches"):
@@ -82,5 +135,4 @@ def extract_cylinders(
     with log.stage("merging"):
         findings = rounds.merge(log)
         blends = rounds.merge_blends(findings, log)
-    with log.stage("labelling"):
-        return assemble(prepared, indexed, findings, rounds.rejected, log.reports, blends)
+    return Search(indexed, all_windows, findings, blends, rounds.rejected)

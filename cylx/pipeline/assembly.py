@@ -62,7 +62,7 @@ def assemble(
     order = [int(i) for i in np.lexsort((np.arange(len(findings)), -counts, -trust)) if counts[i] > 0]
     squares = np.bincount(labels[labels >= 0], residuals[labels >= 0] ** 2, minlength=len(findings))
     fits = [
-        _fit_of(findings[i], int(counts[i]), float(np.sqrt(squares[i] / counts[i])) * frame.spacing, prepared, indexed)
+        fit_of(findings[i], int(counts[i]), float(np.sqrt(squares[i] / counts[i])) * frame.spacing, prepared, indexed)
         for i in order
     ]
     number = np.full(len(findings) + 1, -1, np.int32)  # the last entry is what label -1 maps to
@@ -79,24 +79,19 @@ def assemble(
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, shown, arcs)
 
 
-def _blends(
-    findings: list[Finding], labels: NDArray[np.int32], prepared: Prepared, indexed: IndexedCloud
-) -> list[CylinderFit]:
-    """Put blends into scene units; a point belongs to the nearest of those that no cylinder has."""
-    frame = prepared.frame
-    owners, residuals = label_points([finding.segment for finding in findings], indexed)
-    owners[labels >= 0] = -1
-    out = []
-    for i, finding in enumerate(findings):
-        own = residuals[owners == i]
-        if len(own):
-            rmse = float(np.sqrt((own**2).mean())) * frame.spacing
-            out.append(_fit_of(finding, len(own), rmse, prepared, indexed))
-    return out
+def fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared, indexed: IndexedCloud) -> CylinderFit:
+    """Put a finding into scene units; what its method does not compute is None.
 
-
-def _fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared, indexed: IndexedCloud) -> CylinderFit:
-    """Put a finding into scene units; what its method does not compute is None."""
+    Parameters
+    ----------
+    finding : Finding
+    inliers : int
+        Points with its label.
+    rmse : float
+        Root mean square of their distances to the surface, scene units.
+    prepared : Prepared
+    indexed : IndexedCloud
+    """
     frame, config = prepared.frame, prepared.config
     game = config.method == "gt"
     verified = config.verification.enabled and game
@@ -114,6 +109,22 @@ def _fit_of(finding: Finding, inliers: int, rmse: float, prepared: Prepared, ind
         _form(finding, frame.spacing),
         side_of(finding.segment, indexed, finding.coverage) if finding.measures else None,
     )
+
+
+def _blends(
+    findings: list[Finding], labels: NDArray[np.int32], prepared: Prepared, indexed: IndexedCloud
+) -> list[CylinderFit]:
+    """Put blends into scene units; a point belongs to the nearest of those that no cylinder has."""
+    frame = prepared.frame
+    owners, residuals = label_points([finding.segment for finding in findings], indexed)
+    owners[labels >= 0] = -1
+    out = []
+    for i, finding in enumerate(findings):
+        own = residuals[owners == i]
+        if len(own):
+            rmse = float(np.sqrt((own**2).mean())) * frame.spacing
+            out.append(fit_of(finding, len(own), rmse, prepared, indexed))
+    return out
 
 
 def _form(finding: Finding | RejectedSegment, spacing: float) -> float | None:

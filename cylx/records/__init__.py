@@ -23,6 +23,7 @@ from cylx.records.progress import Observer, SilentObserver, StageReport
 from cylx.records.scales import CELL, Explained, Nearby, Scale
 from cylx.records.sources import Crop, Selection, Source
 from cylx.records.streams import stream
+from cylx.records.tiled import TiledExtraction, Tiling
 
 __all__ = [
     "CELL",
@@ -51,6 +52,8 @@ __all__ = [
     "Slice",
     "Source",
     "StageReport",
+    "TiledExtraction",
+    "Tiling",
     "cell_keys",
     "stream",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -308,17 +308,21 @@ class Extraction:
             `points`, `directions`, `starts` and `ends` of shape (M, 3); `radii`, `heights`, `inliers` (integers),
             `rmse`, `coverages` and `confidences` of shape (M,). Scene units and radians; NaN for no confidence.
         """
-        fits = self.cylinders
-        shapes = [fit.cylinder for fit in fits]
-        return {
-            "points": np.array([shape.point for shape in shapes], np.float64).reshape(-1, 3),
-            "directions": np.array([shape.direction for shape in shapes], np.float64).reshape(-1, 3),
-            "starts": np.array([shape.start for shape in shapes], np.float64).reshape(-1, 3),
-            "ends": np.array([shape.end for shape in shapes], np.float64).reshape(-1, 3),
-            "radii": np.array([shape.radius for shape in shapes], np.float64),
-            "heights": np.array([shape.height for shape in shapes], np.float64),
-            "inliers": np.array([fit.inliers for fit in fits], np.int64),
-            "rmse": np.array([fit.rmse for fit in fits], np.float64),
-            "coverages": np.array([fit.coverage for fit in fits], np.float64),
-            "confidences": np.array([np.nan if fit.confidence is None else fit.confidence for fit in fits], np.float64),
-        }
+        return arrays_of(self.cylinders)
+
+
+def arrays_of(fits: Sequence[CylinderFit]) -> dict[str, NDArray[Any]]:
+    """Return cylinders as arrays; see `Extraction.to_arrays`."""
+    shapes = [fit.cylinder for fit in fits]
+    return {
+        "points": np.array([shape.point for shape in shapes], np.float64).reshape(-1, 3),
+        "directions": np.array([shape.direction for shape in shapes], np.float64).reshape(-1, 3),
+        "starts": np.array([shape.start for shape in shapes], np.float64).reshape(-1, 3),
+        "ends": np.array([shape.end for shape in shapes], np.float64).reshape(-1, 3),
+        "radii": np.array([shape.radius for shape in shapes], np.float64),
+        "heights": np.array([shape.height for shape in shapes], np.float64),
+        "inliers": np.array([fit.inliers for fit in fits], np.int64),
+        "rmse": np.array([fit.rmse for fit in fits], np.float64),
+        "coverages": np.array([fit.coverage for fit in fits], np.float64),
+        "confidences": np.array([np.nan if fit.confidence is None else fit.confidence for fit in fits], np.float64),
+    }

@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from cylx.harmless import visible
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, Selection
+    from cylx.records import Extraction, Selection, Source, TiledExtraction
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[Number, Field(ge=0)]
@@ -46,6 +46,19 @@ class Crop(Part):
     """Largest coordinates, scene units."""
 
 
+class InputFile(Part):
+    """One of several files that are one cloud."""
+
+    file: str
+    """Name of the file without its folder."""
+    format: str
+    """`ply`, `pcd`, `xyz`, `las`, `e57` or `npy`."""
+    points: Count
+    """Number of points, including those without finite coordinates and those not used."""
+    sha256: str | None = None
+    """Digest of the bytes read; absent for an array."""
+
+
 class Input(Part):
     """The input cloud, and the selection of its points."""
 
@@ -57,6 +70,8 @@ class Input(Part):
     """Number of points, including those without finite coordinates and those not used."""
     sha256: str | None = None
     """Digest of the bytes read; absent for an array."""
+    files: list[InputFile] | None = None
+    """All files of the cloud, if there are several; `file`, `format` and `sha256` are those of the first."""
     scan: Count | None = None
     """Number of the scan that was read, from 0; absent if all were read."""
     crop: Crop | None = None
@@ -87,18 +102,45 @@ class Input(Part):
         return all(getattr(self, name) == value for name, value in self.keys_of(selection).items())
 
     @classmethod
-    def of(cls, extraction: Extraction) -> Input:
+    def of(cls, extraction: Extraction | TiledExtraction) -> Input:
         """Describe the input of an extraction."""
+        from cylx.records import TiledExtraction  # noqa: PLC0415  records bring numba
+
+        if isinstance(extraction, TiledExtraction):
+            return cls._of_tiled(extraction)
         cloud = extraction.cloud
-        name = cloud.source.file if cloud.source.format == "array" else Path(cloud.source.file).name
         return cls(
-            file=name.encode("utf-8", "backslashreplace").decode("utf-8"),
+            file=_name_of(cloud.source),
             format=cloud.source.format,
             points=cloud.rows,
             sha256=cloud.source.sha256,
             **cls.keys_of(cloud.source.selection),
             bounds=Bounds(min=plain_numbers(cloud.points.min(axis=0)), max=plain_numbers(cloud.points.max(axis=0))),
         )
+
+    @classmethod
+    def _of_tiled(cls, extraction: TiledExtraction) -> Input:
+        """Describe the files of a cloud in tiles."""
+        files = [
+            InputFile(file=_name_of(source), format=source.format, points=rows, sha256=source.sha256)
+            for source, rows in zip(extraction.sources, extraction.rows, strict=True)
+        ]
+        low, high = (plain_numbers(corner) for corner in extraction.bounds)
+        return cls(
+            file=files[0].file,
+            format=files[0].format,
+            points=sum(extraction.rows),
+            sha256=files[0].sha256,
+            files=files if len(files) > 1 else None,
+            **cls.keys_of(extraction.selection),
+            bounds=Bounds(min=low, max=high),
+        )
+
+
+def _name_of(source: Source) -> str:
+    """Return the name of a source without its folder, in valid UTF-8."""
+    name = source.file if source.format == "array" else Path(source.file).name
+    return name.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def drop_missing(parts: Iterable[dict[str, Any]]) -> None:

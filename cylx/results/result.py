@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, JsonValue, ValidationError, field_validator
 
@@ -23,7 +24,7 @@ from cylx.version import __version__
 from cylx.wording import counted
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, Scene, StageReport
+    from cylx.records import Extraction, Scene, StageReport, TiledExtraction
 
 
 class SceneScale(Part):
@@ -58,6 +59,21 @@ class Stage(Part):
     """Rejected inputs: count by reason."""
 
 
+class Tiles(Part):
+    """How a cloud was cut into tiles."""
+
+    count: Count
+    """Number of tiles."""
+    size: Annotated[Length, Field(gt=0)] | None = None
+    """Greatest side of a tile, scene units; absent if the number of points decided alone."""
+    buffer: Length
+    """Margin about each tile in which it sees the points of its neighbours, scene units."""
+    most_points: Count
+    """Points of the largest tile, without its margin."""
+    joined: Count
+    """Groups of cylinders of several tiles that were fitted together."""
+
+
 class Result(Part):
     """The cylinders of one cloud, with the method and the settings that found them."""
 
@@ -75,6 +91,8 @@ class Result(Part):
     """The resolved configuration, every value."""
     scene: SceneScale
     """Scale and noise of the cloud."""
+    tiles: Tiles | None = None
+    """How the cloud was cut; absent if it was not."""
     stages: list[Stage]
     """Counts per stage, in order."""
     cylinders: list[ResultCylinder]
@@ -92,21 +110,22 @@ class Result(Part):
         return config
 
     @classmethod
-    def of(cls, extraction: Extraction) -> Result:
+    def of(cls, extraction: Extraction | TiledExtraction) -> Result:
         """Describe an extraction.
 
         Parameters
         ----------
-        extraction : Extraction
+        extraction : Extraction or TiledExtraction
             The output of a run.
         """
-        blends = extraction.blends
+        blends, tiling = extraction.blends, getattr(extraction, "tiling", None)
         return cls(
             cylx_version=__version__,
             input=Input.of(extraction),
             method=extraction.config.method,
             config=extraction.config.model_dump(mode="json"),
             scene=SceneScale.of(extraction.scene),
+            tiles=None if tiling is None else Tiles.model_validate(asdict(tiling)),
             stages=[_stage(report) for report in extraction.stages],
             cylinders=[ResultCylinder.of(i, fit) for i, fit in enumerate(extraction.cylinders)],
             blends=None if blends is None else [ResultBlend.of(i, fit) for i, fit in enumerate(blends)],
@@ -161,7 +180,7 @@ class Result(Part):
     def to_object(self) -> dict[str, Any]:
         """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        drop_missing([content, content["input"], content["scene"]])
+        drop_missing([content, content["input"], content["scene"], content.get("tiles") or {}])
         lists = {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
         if self.blends is not None:
             lists["blends"] = [blend.to_object() for blend in self.blends]

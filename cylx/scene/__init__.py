@@ -6,7 +6,7 @@ from cylx.scene.noise_variation import noise_by_place, noise_by_size
 from cylx.scene.prepare import Prepared, prepare
 from cylx.scene.priors import catalogue_of, known_of, out_of_range, radius_range
 from cylx.scene.resolve import resolve, thinnest
-from cylx.scene.selection import select
+from cylx.scene.selection import rows_selected, select
 
 __all__ = [
     "Patches",
@@ -25,6 +25,7 @@ __all__ = [
     "prepare",
     "radius_range",
     "resolve",
+    "rows_selected",
     "select",
     "thinnest",
 ]

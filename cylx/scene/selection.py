@@ -67,6 +67,43 @@ def select(cloud: PointCloud, selection: Selection) -> PointCloud:
     return PointCloud(cloud.points[keep], _whole_table(cloud), None if valid.all() else valid, source)
 
 
+def rows_selected(
+    selection: Selection, points: FloatArray, table: NDArray[np.void], rows: IndexArray, place: str
+) -> MaskArray:
+    """Return which rows of a part of a cloud are selected, but for `voxel`, which needs all of them.
+
+    Parameters
+    ----------
+    selection : Selection
+    points : ndarray of shape (n, 3)
+        Coordinates of the rows.
+    table : ndarray of shape (n,), structured
+    rows : ndarray of shape (n,)
+        Numbers of the rows.
+    place : str
+        The cloud, for errors.
+
+    Returns
+    -------
+    ndarray of shape (n,), bool
+
+    Raises
+    ------
+    InputError
+        If classes are asked for, and the points have none.
+    """
+    keep = np.ones(len(points), dtype=np.bool_)
+    if selection.crop is not None:
+        keep &= inside_box(points, selection.crop)
+    if selection.classes is not None:
+        if _CLASSES not in (table.dtype.names or ()):
+            raise InputError(place, f"its points have no {_CLASSES}", "give a LAS or LAZ file that has it")
+        keep &= np.isin(table[_CLASSES], selection.classes)
+    if selection.every is not None:
+        keep &= rows % selection.every == 0
+    return keep
+
+
 def inside_box(points: FloatArray, crop: Crop) -> MaskArray:
     """Return which points are in a box along the axes, sides included.
 

@@ -8,9 +8,10 @@ MAY_IMPORT = {
     },
     "cli": {
         "api", "config", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional", "palette",
-        "pipeline", "records", "report", "results", "scene", "synthetic", "version", "wording",
+        "pipeline", "records", "report", "results", "scene", "synthetic", "tiles", "version", "wording",
     },
-    "api": {"config", "evaluation", "geometry", "io", "pipeline", "records", "results", "scene", "stages"},
+    "api": {"config", "evaluation", "geometry", "io", "pipeline", "records", "results", "scene", "stages", "tiles"},
+    "tiles": {"config", "errors", "geometry", "io", "optional", "pipeline", "records", "scene"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
         "baselines", "config", "errors", "evidence", "fits", "game", "geometry", "records", "scene", "segments",

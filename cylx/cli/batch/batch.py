@@ -140,14 +140,16 @@ class Batch:
             else:
                 yield index, self._skipped(job, finished)
         jobs = [self.jobs[index] for index in todo]
-        processes = self.options.processes([job.scan for job in jobs])
+        # the processes search the tiles of one scan after the other
+        processes = None if self.run.tiles.certain else self.options.processes([job.scan for job in jobs])
         answers = self._here(jobs) if processes is None else self._elsewhere(jobs, processes)
         with closing(answers):
             for place, outcome in answers:
                 yield todo[place], outcome
 
     def _finished_before(self, job: Job) -> Finished | None:
-        result = finished_before(job, self.run.settings, self.run.selection) if self.options.resume else None
+        whole = self.options.resume and not self.run.others
+        result = finished_before(job, self.run.settings, self.run.selection) if whole else None
         if result is None:
             return None
         blends = len(result.blends or ())
@@ -163,7 +165,7 @@ class Batch:
         from cylx.cli.batch.workers import Lost, Workers
 
         run = self._silent()
-        run = replace(run, threads=run.threads or max(1, cores() // processes))
+        run = replace(run, threads=run.threads or max(1, cores() // processes), processes=None)
 
         workers: Workers[Job, Outcome] = Workers(partial(attempt, run, _debug()), processes, self._tidy)
         with closing(workers.run(jobs, [memory_needed(job.scan) for job in jobs])) as answers:

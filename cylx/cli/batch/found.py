@@ -10,13 +10,13 @@ from cylx.wording import counted
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
-    from cylx.records import CylinderFit, Extraction
+    from cylx.records import CylinderFit, Extraction, TiledExtraction
 
 _MOST_ROWS = 20
 _CYLINDER_HEADER = ["id", "radius", "height", "coverage", "inliers", "rmse", "confidence", "direction"]
 
 
-def report(messages: Messages, job: Job, extraction: Extraction) -> None:
+def report(messages: Messages, job: Job, extraction: Extraction | TiledExtraction) -> None:
     """Report the cylinders found in a scan and the files written."""
     if messages.quiet:
         return
@@ -71,7 +71,7 @@ def _nominal(fit: CylinderFit) -> str:
     return (nominal.name or f"{nominal.nominal_radius:.5g}") + ("?" if nominal.decision == "ambiguous" else "")
 
 
-def _stage_rows(extraction: Extraction) -> list[list[str]]:
+def _stage_rows(extraction: Extraction | TiledExtraction) -> list[list[str]]:
     """Format the rows of the table of stages."""
     return [
         [

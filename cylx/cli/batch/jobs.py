@@ -180,6 +180,15 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
         check_writable(name, overwrite=overwrite)
 
 
+def mesh_bytes(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
+    """Make the requested mesh, with remarks for its reader."""
+    if job.mesh is None:
+        return None, []
+    from cylx.cli.batch.meshes import mesh_of
+
+    return mesh_of(job.mesh, content.cylinders, job.units)
+
+
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> Written:
     """Write the JSON of one scan, and the other requested outputs; the JSON is kept if one of them fails.
 

@@ -83,6 +83,10 @@ class BatchOptions(NamedTuple):
             room += 1
         return max(room, 1)
 
+    def tile_processes(self) -> int | None:
+        """Return the number of processes that search tiles; None for this process alone."""
+        return cores() if self.jobs == AUTO else self.jobs
+
 
 @contextmanager
 def made_folder(output: str | None) -> Iterator[None]:

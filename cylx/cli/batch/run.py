@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from cylx.cli.batch.annotated import check_format
 from cylx.cli.batch.jobs import Job, write_job
 from cylx.cli.batch.outcomes import Finished, Outcome, check_finished, failed_outcome, failure_of
+from cylx.cli.options.tiles import NO_TILES, TileOptions
 from cylx.cli.terminal.failures import blamed_on
 from cylx.cli.terminal.signals import Listener, check_heard
 from cylx.cli.terminal.stopwatch import Stopwatch, peak_memory
@@ -36,6 +37,14 @@ class Run:
         Where messages are shown.
     selection : Selection
         Which points are used.
+    tiles : TileOptions
+        When to cut a scan into tiles, and how.
+    processes : int or None
+        Number of processes that search tiles; None for this one alone.
+    resume : bool
+        Whether tiles of an earlier run are gone on with.
+    others : tuple of Job
+        Further files that are one cloud with the scan.
     """
 
     settings: Config
@@ -44,6 +53,10 @@ class Run:
     overwrite: bool
     messages: Messages
     selection: Selection
+    tiles: TileOptions = NO_TILES
+    processes: int | None = None
+    resume: bool = False
+    others: tuple[Job, ...] = ()
 
     def extract_one(self, job: Job) -> Finished:
         """Read a scan, find its cylinders, write them, and report them.
@@ -56,6 +69,23 @@ class Run:
             If the JSON cannot be written; what went wrong with the other outputs is in what is returned.
         """
         from cylx.cli.batch.found import report
+        from cylx.cli.batch.tiled import TiledRun, check_tiles, extract_tiled, needs_tiles, why_tiles
+
+        if needs_tiles(job.scan, self.tiles):
+            if not self.tiles.certain:
+                check_tiles([job], self.settings, self.selection)
+                self.messages.say(why_tiles(job.scan, self.tiles))
+            how = TiledRun(
+                self.settings,
+                self.threads,
+                self.overwrite,
+                self.messages,
+                self.selection,
+                self.tiles,
+                self.processes,
+                self.resume,
+            )
+            return extract_tiled(how, [job, *self.others])
         from cylx.cli.terminal.display import Observers, observed
         from cylx.cli.terminal.startup import collect_rarely, import_numba_without_blas
 

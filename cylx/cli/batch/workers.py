@@ -64,7 +64,9 @@ class Workers(Generic[Task, Answer]):
         self._idle: list[_Worker] = []
         self._busy: dict[int, _Worker] = {}
 
-    def run(self, tasks: Sequence[Task], needs: Sequence[int]) -> Generator[tuple[int, Answer | Lost], None, None]:
+    def run(
+        self, tasks: Sequence[Task], needs: Sequence[int], waited: Callable[[], None] = lambda: None
+    ) -> Generator[tuple[int, Answer | Lost], None, None]:
         """Run all tasks; they are started in their order.
 
         Parameters
@@ -73,6 +75,8 @@ class Workers(Generic[Task, Answer]):
             They are pickled.
         needs : sequence of int
             Estimated peak memory of each, bytes.
+        waited : callable
+            Called at least once a second while tasks are running.
 
         Yields
         ------
@@ -87,6 +91,7 @@ class Workers(Generic[Task, Answer]):
                     if not self._start(waiting[0], tasks):
                         break
                     waiting.popleft()
+                waited()
                 ready = wait([worker.pipe for worker in self._busy.values()], _GLANCE)
                 for index in [index for index, worker in self._busy.items() if worker.pipe in ready]:
                     yield index, self._take(index)

@@ -1,0 +1,264 @@
+"""Clouds that are read piece by piece, as often as needed, so that they need not fit into memory."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from cylx.errors import InputError
+from cylx.io.clouds import read_cloud
+from cylx.io.formats import cloud_name, cloud_suffix, recognise
+from cylx.io.inputs import Input, check_unchanged, printable, sha256_of, stamp_of
+from cylx.io.las import las_parts, libraries_for
+from cylx.io.las_header import kept_header, las_header
+from cylx.io.names import coordinate_names, mended_names
+from cylx.io.npy import columns_of, map_npy
+from cylx.io.ply_header import TYPES, Header, read_header
+from cylx.optional.extras import require
+from cylx.records import PointCloud, Source
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    Parts = Callable[[], Iterator[NDArray[np.void]]]
+
+ROWS = 1 << 18
+"""Rows of a piece, at the most."""
+_BARE = np.dtype([(axis, "f8") for axis in "xyz"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StreamedCloud:
+    """A cloud whose table is read piece by piece.
+
+    Parameters
+    ----------
+    source : Source
+        Where it comes from.
+    rows : int
+        Number of its rows.
+    dtype : dtype
+        Structured: its columns.
+    parts : callable
+        Yields the table from its beginning, in pieces of `ROWS` rows; the last one may be shorter.
+    """
+
+    source: Source
+    rows: int
+    dtype: np.dtype[np.void]
+    parts: Parts
+
+    @property
+    def bare(self) -> bool:
+        """Whether it has nothing but coordinates, in double precision."""
+        return self.dtype == _BARE
+
+    def coordinates(self, table: NDArray[np.void]) -> NDArray[np.float64]:
+        """Return the coordinates of rows, shape (n, 3), finite or not."""
+        points = np.empty((len(table), 3))
+        with np.errstate(all="ignore"):  # a signalling NaN is a NaN
+            for axis, name in enumerate(coordinate_names(self.dtype.names or ())):
+                points[:, axis] = table[name]
+        return points
+
+    def few(self, count: int) -> PointCloud:
+        """Return a cloud of the first rows that have coordinates, to try what can be written."""
+        for table in self.parts():
+            points = self.coordinates(table)
+            on = np.flatnonzero(np.isfinite(points).all(axis=1))[:count]
+            if len(on):
+                return PointCloud(points[on], None if self.bare else table[on], None, self.source)
+        raise InputError(printable(self.source.file), "no point has finite coordinates", "export the file again")
+
+
+def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None) -> StreamedCloud:
+    """Open a cloud to be read piece by piece.
+
+    LAS, LAZ, NPY and binary PLY are read from their file. Other formats are read once as a whole, and from then on
+    from a copy on the disk.
+
+    Parameters
+    ----------
+    path : str or Path
+    spool : Path
+        Where the copy may be put.
+    scan : int, optional
+        Number of the scan of an E57 file to read.
+
+    Returns
+    -------
+    StreamedCloud
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    if str(path) != "-" and cloud_name(path) == str(path) and scan is None:
+        stamp, digest = stamp_of(path), sha256_of(path)
+        with _opened(path, digest) as source:
+            kind = recognise(source, cloud_suffix(path))
+            streamed = _STREAMED[kind](source, Path(path)) if kind in _STREAMED else None
+        if streamed is not None:
+            return _guarded(streamed, path, stamp, digest)
+    return _spooled(read_cloud(path, scan=scan), spool)
+
+
+def stream_arrays(pieces: Iterable[ArrayLike], spool: Path) -> StreamedCloud:
+    """Copy arrays of points to the disk, to be read from there piece by piece.
+
+    Parameters
+    ----------
+    pieces : iterable of array_like of shape (n, 3)
+    spool : Path
+        Where the copy is put.
+
+    Raises
+    ------
+    ValueError
+        If the shape of a piece is not (n, 3).
+    InputError
+        If there is no point.
+    """
+    rows = 0
+    with spool.open("wb") as file:
+        for piece in pieces:
+            points = np.ascontiguousarray(piece, dtype=np.float64)
+            if points.ndim != 2 or points.shape[1] != 3:
+                raise ValueError(f"points must have shape (n, 3), not {points.shape}")
+            file.write(points.tobytes())
+            rows += len(points)
+    if rows == 0:
+        raise InputError("<array>", "holds no points", "give some")
+    return StreamedCloud(Source("<array>", "array"), rows, _BARE, _from_raw(spool, _BARE, rows))
+
+
+def _guarded(cloud: StreamedCloud, path: str | Path, stamp: tuple[int, ...] | None, digest: str) -> StreamedCloud:
+    """Return a cloud that checks at the end of each reading that its file is as it was."""
+
+    def parts() -> Iterator[NDArray[np.void]]:
+        try:
+            yield from cloud.parts()
+        except OSError as error:
+            _refuse(path, error)
+        check_unchanged(path, stamp, digest)
+
+    return StreamedCloud(cloud.source, cloud.rows, cloud.dtype, parts)
+
+
+def _refuse(path: str | Path, error: OSError) -> NoReturn:
+    fault = error.strerror or str(error)
+    raise InputError(printable(path), f"cannot be read: {fault.lower()}", "check the path and the disk") from None
+
+
+@contextmanager
+def _opened(path: str | Path, digest: str) -> Iterator[Input]:
+    with Path(path).open("rb") as file:
+        yield Input(printable(path), file, os.fstat(file.fileno()).st_size, digest, Path(path))
+
+
+def _source(source: Input, path: Path, kind: str, **facts: Any) -> Source:  # noqa: ANN401  (of Source)
+    return Source(str(path).encode("utf-8", "replace").decode(), kind, source.sha256, **facts)
+
+
+def _stream_las(source: Input, path: Path) -> StreamedCloud:
+    facts = las_header(source)
+    require(*libraries_for(facts), place=source.place, needed_by="", error=InputError)
+    about = _source(source, path, "las", header=kept_header(source, facts), doubts=facts.doubts)
+
+    def parts() -> Iterator[NDArray[np.void]]:
+        with _opened(path, source.sha256) as file:
+            yield from _of_size(las_parts(file))
+
+    first = next(las_parts(source))
+    return StreamedCloud(about, facts.points, first.dtype, parts)
+
+
+def _of_size(parts: Iterator[NDArray[np.void]]) -> Iterator[NDArray[np.void]]:
+    """Yield the same rows in pieces of the usual size, whatever the size of those given."""
+    left: list[NDArray[np.void]] = []
+    for part in parts:
+        left.append(part)
+        while sum(map(len, left)) >= ROWS:
+            whole = left[0] if len(left) == 1 else np.concatenate(left)
+            yield whole[:ROWS]
+            left = [whole[ROWS:]]
+    rest = np.concatenate(left)
+    if len(rest):
+        yield rest
+
+
+def _stream_npy(source: Input, path: Path) -> StreamedCloud | None:
+    if source.head(6) != b"\x93NUMPY":
+        return None
+    array = map_npy(source)
+    count, dtype = len(array), columns_of(array[:1], source.place).dtype
+
+    def parts() -> Iterator[NDArray[np.void]]:
+        for start in range(0, count, ROWS):
+            with _opened(path, source.sha256) as file:  # mapped anew: what was read before need not stay in memory
+                yield columns_of(np.array(map_npy(file)[start : start + ROWS]), file.place)
+
+    return StreamedCloud(_source(source, path, "npy"), count, dtype, parts)
+
+
+def _stream_ply(source: Input, path: Path) -> StreamedCloud | None:
+    header = read_header(source)
+    if header.text or any(element.has_lists for element in header.elements):
+        return None
+    count, dtype = header.vertex.count, _ply_rows(header)
+    start = header.size + sum(element.count * element.least_size(False) for element in header.elements[:-1])
+    return StreamedCloud(_source(source, path, "ply"), count, dtype, _from_raw(path, dtype, count, start))
+
+
+def _ply_rows(header: Header) -> np.dtype[np.void]:
+    """Return the type of a row of the vertices."""
+    order = ">" if header.format == "binary_big_endian" else "<"
+    properties = header.vertex.properties
+    names = mended_names([item.name for item in properties])
+    return np.dtype([(name, order + TYPES[item.type]) for name, item in zip(names, properties, strict=True)])
+
+
+_STREAMED: dict[str, Callable[[Input, Path], StreamedCloud | None]] = {
+    "las": _stream_las,
+    "npy": _stream_npy,
+    "ply": _stream_ply,
+}
+
+
+def _spooled(cloud: PointCloud, spool: Path) -> StreamedCloud:
+    """Write the table of a cloud to the disk."""
+    table = cloud.table
+    if table is None:
+        table = np.empty(cloud.rows, _BARE)
+        for place, axis in enumerate("xyz"):
+            table[axis] = cloud.spread(cloud.points[:, place], np.nan)
+    if table.dtype.hasobject:
+        fault = "has list properties, and cannot be cut into tiles"
+        raise InputError(printable(cloud.source.file), fault, "write it without them")
+    with spool.open("wb") as file:
+        for start in range(0, len(table), ROWS):
+            file.write(table[start : start + ROWS].tobytes())
+    return StreamedCloud(cloud.source, len(table), table.dtype, _from_raw(spool, table.dtype, len(table)))
+
+
+def _from_raw(path: Path, dtype: np.dtype[np.void], rows: int, offset: int = 0) -> Parts:
+    """Return what reads rows of a type from a place in a file on."""
+
+    def parts() -> Iterator[NDArray[np.void]]:
+        with path.open("rb") as file:
+            file.seek(offset)
+            for start in range(0, rows, ROWS):
+                count = min(ROWS, rows - start)
+                data = file.read(count * dtype.itemsize)
+                if len(data) < count * dtype.itemsize:
+                    raise InputError(printable(path), "was cut short meanwhile", "get a complete copy of the file")
+                yield np.frombuffer(data, dtype)
+
+    return parts

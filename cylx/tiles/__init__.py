@@ -1,0 +1,1 @@
+"""Clouds larger than memory: cut into tiles, each searched by itself, and joined to one result."""

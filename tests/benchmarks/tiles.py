@@ -1,0 +1,180 @@
+"""A plant made in pieces, extracted as a whole and in tiles: what is found, how long it takes, how much memory.
+
+A piece is a rack of 6 x 6 m with thirty pipes in layers, beams and a floor; four more pipes run through all pieces of a
+row. The memory is that of all processes together, looked at ten times a second.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from runs import CYLX, truth_of, warm_up
+from tables import Bars, print_header, print_row
+
+from cylx.evaluation import evaluate
+
+SIDE, LAYERS, OF_LAYER, HEADERS, SIGMA = 6.0, 6, 5, 4, 0.002
+A_PIECE = 1_000_000
+
+
+def layout(rng, corner):
+    """Give the pipes of a piece: (start, end, radius, seen angle)."""
+    pipes, z = [], 0.4
+    for layer in range(LAYERS):
+        most = (0.2, 0.08, 0.15, 0.05, 0.1, 0.2)[layer]
+        radii = np.exp(rng.uniform(np.log(0.025), np.log(most), OF_LAYER))
+        gaps = rng.dirichlet(np.full(OF_LAYER + 1, 2.0)) * (SIDE - 0.4 - 2.0 * radii.sum() - 0.05 * OF_LAYER) + 0.05
+        across = 0.2
+        for radius, gap in zip(radii, gaps, strict=False):
+            across += gap + radius
+            length = rng.uniform(2.0, SIDE - 0.2)
+            first = rng.uniform(0.1, SIDE - 0.1 - length)
+            place = z + radius
+            ends = [(first, across, place), (first + length, across, place)]
+            if layer % 2:
+                ends = [(y, x, h) for x, y, h in ends]
+            seen = np.radians(rng.uniform(160.0, 360.0))
+            pipes.append((*(np.array(end) + corner for end in ends), float(radius), seen))
+            across += radius
+        z += 2.0 * most + 0.2
+    return pipes
+
+
+def on_pipe(rng, start, end, radius, seen, count):
+    """Give points on a pipe."""
+    along = (end - start) / np.linalg.norm(end - start)
+    across = np.cross(along, [0.0, 0.0, 1.0])
+    up = np.cross(across, along)
+    turn = 0.5 * np.pi + seen * (rng.random(count) - 0.5)
+    at = start + rng.random(count)[:, None] * (end - start)
+    return at + radius * (np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * up)
+
+
+def piece(seed, column, row, headers):
+    """Give the points and the pipes of a piece; the headers are those of its row."""
+    rng = np.random.default_rng([7, seed, column, row])
+    corner = np.array([column * SIDE, row * SIDE, 0.0])
+    pipes = layout(rng, corner)
+    step = np.array([SIDE, 0.0, 0.0])
+    through = [(np.array([corner[0], y, z]), np.array([corner[0], y, z]) + step, r, 2 * np.pi) for y, z, r in headers]
+    areas = np.array([np.linalg.norm(b - a) * r * seen for a, b, r, seen in [*pipes, *through]])
+    floor, beams = SIDE * SIDE, [(x, z) for x in (1.0, 3.0, 5.0) for z in np.linspace(0.3, 2.6, 6)]
+    total = areas.sum() + 0.5 * floor + len(beams) * SIDE * 0.1
+    counts = (A_PIECE * areas / total).astype(int)
+    points = [on_pipe(rng, *one, n) for one, n in zip([*pipes, *through], counts, strict=True)]
+    flat = int(A_PIECE * SIDE * 0.1 / total)
+    for x, z in beams:
+        points.append(corner + [x, 0.0, z] + rng.random((flat, 3)) * [0.1, SIDE, 0.0])
+    left = A_PIECE - sum(map(len, points))
+    points.append(corner + rng.random((left, 3)) * [SIDE, SIDE, 0.0])
+    cloud = np.concatenate(points)
+    cloud += SIGMA * rng.standard_normal(cloud.shape)
+    return cloud[rng.permutation(A_PIECE)], pipes
+
+
+def make(path, pieces, seed):
+    """Write a plant of so many pieces as NPY, piece by piece, and its truth."""
+    columns = int(np.ceil(np.sqrt(pieces)))
+    truth, rng = [], np.random.default_rng([8, seed])
+    rows = [
+        [(r * SIDE + 0.5 + 1.4 * k, 3.2 + 0.3 * k, float(rng.uniform(0.05, 0.12))) for k in range(HEADERS)]
+        for r in range(-(-pieces // columns))
+    ]
+    with path.open("wb") as file:
+        about = {"descr": "<f8", "fortran_order": False, "shape": (pieces * A_PIECE, 3)}
+        np.lib.format.write_array_header_1_0(file, about)
+        for number in range(pieces):
+            row, column = divmod(number, columns)
+            points, pipes = piece(seed, column, row, rows[row])
+            file.write(points.tobytes())
+            truth += [(start, end, radius) for start, end, radius, _ in pipes]
+    for r, headers in enumerate(rows):
+        length = SIDE * min(columns, pieces - r * columns)
+        truth += [(np.array([0.0, y, z]), np.array([length, y, z]), radius) for y, z, radius in headers]
+    entries = [
+        {
+            "id": i,
+            "axis_point": (0.5 * (start + end)).tolist(),
+            "axis_direction": ((end - start) / np.linalg.norm(end - start)).tolist(),
+            "radius": radius,
+            "height": float(np.linalg.norm(end - start)),
+            "ignore": False,
+        }
+        for i, (start, end, radius) in enumerate(truth)
+    ]
+    truth_of(path).write_text(json.dumps({"points": pieces * A_PIECE, "cylinders": entries}), encoding="utf-8")
+
+
+def weight(process):
+    """Give the memory of a process and all below it that no file stands behind, MB."""
+    total = 0.0
+    try:
+        status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
+        total = int(status.split("RssAnon:")[1].split()[0]) / 1e3
+        children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii").split()
+    except (OSError, IndexError):
+        return total
+    return total + sum(weight(int(child)) for child in children)
+
+
+def watched(command):
+    """Run a command; give its exit code, seconds, and peak memory."""
+    started, peak = time.perf_counter(), 0.0
+    with subprocess.Popen([str(word) for word in command], stderr=subprocess.DEVNULL) as child:
+        while child.poll() is None:
+            peak = max(peak, weight(child.pid))
+            time.sleep(0.1)
+    return child.returncode, time.perf_counter() - started, peak
+
+
+def measure(scene, folder, extra, bars, most):
+    """Print the row of a run; give its result."""
+    output = Path(folder) / f"{scene.stem}.json"
+    command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", *extra]
+    code, seconds, peak = watched(command)
+    if code:
+        print_row(scene.stem, " ".join(extra) or "whole", *["-"] * 6)
+        return None
+    result, truth = (json.loads(path.read_text(encoding="utf-8")) for path in (output, truth_of(scene)))
+    told, tiles = evaluate(truth, result), result.get("tiles", {"count": 1, "joined": 0})
+    verdict = bars.at_most(peak, most) if extra else ""
+    name = " ".join(extra) or "whole"
+    row = (f"{told.f1:.4f}", f"{tiles['count']}", f"{tiles['joined']}", f"{seconds:.0f}", f"{peak:.0f}", verdict)
+    print_row(scene.stem, name, *row)
+    sys.stdout.flush()
+    return output
+
+
+def main():
+    """Print a row a run."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", metavar="SCENE.npy", nargs="*", type=Path, help="made if missing: plant3.npy has 3 M")
+    parser.add_argument("--whole", action="store_true", help="extract each without tiles, too, and compare")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--memory", default="2GB")
+    a = parser.parse_args()
+    for scene in a.scenes:
+        if not (scene.is_file() and truth_of(scene).is_file()):
+            make(scene, int("".join(filter(str.isdigit, scene.stem))), 0)
+    bars, most = Bars(), float(a.memory.removesuffix("GB")) * 1000
+    print_header("scene", "run", "F1", "tiles", "joined", "seconds", "peak MB", "bar")
+    with tempfile.TemporaryDirectory() as folder:
+        warm_up(folder)
+        for scene in a.scenes:
+            tiled = ("--tile", "auto", "--memory", a.memory, "--jobs", str(a.jobs), "--scratch", folder)
+            first = measure(scene, folder, tiled, bars, most)
+            if a.whole and first is not None:
+                kept = first.with_name("tiled.json")
+                first.replace(kept)
+                measure(scene, folder, (), bars, most)
+                subprocess.run([*CYLX, "diff", first, kept], check=False)
+    return bars.exit_code()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
