@@ -26,8 +26,8 @@ from cylx.tiles.search import WHOLE, Plan, found_in, points_name, search_tile
 from cylx.tiles.tree import usual_side
 
 BASE, A_POINT = 300_000_000, 220
-"""Estimate of the peak memory of the search of a tile, and per point of it and its margin, bytes: a whole cloud of three
-million points takes less, 855 MB in all."""
+"""Estimate of the peak memory of the search of a tile, and per point of it and its margin, bytes: a whole cloud of
+three million points takes less, 855 MB in all."""
 OVERHEAD = 1.6
 """Points of a tile with its margin over those without, at the most, usually."""
 LEAST_POINTS, MOST_POINTS = 20_000, 8_000_000
