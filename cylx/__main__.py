@@ -6,7 +6,7 @@ def run() -> None:
     from cylx.cli.terminal.startup import own_process  # noqa: PLC0415  Ctrl-C is heard from there on
 
     with own_process():
-        from cylx.cli import main  # noqa: PLC0415
+        from cylx.cli import main  # noqa: PLC0415  after Ctrl-C is taken care of
 
         main(prog_name="cylx")
 
