@@ -21,6 +21,10 @@ LIKE_RADIUS = 0.4
 RISE, LARGEST, ENOUGH_WINDOWS = 8.0, 0.9, 8
 """A window can tell a rough surface if the surface rises in it by this many deviations, or if it has this size in
 radii; smaller windows count where there are fewer than this many of such."""
+BLUR, SHARP = 2.0, 0.08
+"""The curvature that n points of a round window of radius w show has a standard deviation of `BLUR` deviations of the
+points over w² √n (least squares, points spread evenly). A window can tell a radius if that is no more than this share
+of the curvature, or if the window has the size `LARGEST`."""
 BESIDE = 0.15
 """A window within this many radii of a surface was laid on it."""
 TOUCHING = 0.25
@@ -55,6 +59,7 @@ class Neighbourhood:
         self._order = np.argsort(candidates.models[:, 0], kind="stable")
         self._models = np.ascontiguousarray(candidates.models[self._order])
         self._windows = candidates.windows[self._order]
+        self._sharpness = self._windows**2 * np.sqrt(np.maximum(candidates.inliers[self._order], 1))
         self._places = np.ascontiguousarray(candidates.places[self._order])
 
     def agreement(self, segment: Segment) -> tuple[int, int]:
@@ -72,14 +77,19 @@ class Neighbourhood:
         """
         part = self._beside(segment, segment.half)
         consistent, near = 0, 0
+        large = LARGEST * segment.radius
+        sharp = BLUR * segment.spread * segment.radius / SHARP
         for seen in (least_telling(segment, rough=True), least_telling(segment)):
             consistent, near = _count_agreeing(
                 self._models[part],
                 self._windows[part],
+                self._sharpness[part],
                 self._places[part],
                 segment.model,
                 segment.half,
                 seen,
+                large,
+                sharp,
                 *AGREEING,
             )
             if near >= ENOUGH_WINDOWS:
@@ -151,17 +161,21 @@ def _is_off(place: FloatArray, model: FloatArray, reach: float) -> bool:
 def _count_agreeing(
     models: FloatArray,
     windows: FloatArray,
+    sharpness: FloatArray,
     places: FloatArray,
     model: FloatArray,
     reach: float,
     seen: float,
+    large: float,
+    sharp: float,
     offset: float,
     cosine: float,
     radius: float,
 ) -> tuple[int, int]:
     consistent, near = 0, 0
     for i in range(len(models)):
-        if windows[i] > seen and not _is_off(places[i], model, reach):
+        telling = windows[i] > seen and (windows[i] >= large or sharpness[i] >= sharp)
+        if telling and not _is_off(places[i], model, reach):
             level = _agrees(models[i], model, reach, offset, cosine, radius)
             near += 1 if level > 0 else 0
             consistent += 1 if level > 1 else 0
