@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cylx.config import VerificationConfig
-from cylx.evidence.local_slopes import radial_pieces
 from cylx.evidence.measures import (
     TRUNCATED,
     Shell,
@@ -137,7 +136,6 @@ def _measures_of(
     along = math.copysign(1.0, segment.direction[np.abs(segment.direction).argmax()])  # as the result has it
     scatter = own_scatter(shell, radius, segment.half, coverage)
     least = LEAST_SHARE * radius
-    radial, told = radial_pieces(shell, radius, segment.half, scatter, coverage)
     measures = {
         "scatter_radii": scatter / radius,
         "form_radii": math.sqrt(max(deviation**2 - scatter**2, 0.0)) / radius,
@@ -170,8 +168,6 @@ def _measures_of(
         "height_radii": 2.0 * segment.half / radius,
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
-        "radial": (radial + 1.0) / (told + 2.0),
-        "pieces": told,
     }
     return measures, (shape["offset_error"], shape["tilt_error"])
 
