@@ -10,6 +10,8 @@ import contextlib
 import hashlib
 import io
 import json
+import multiprocessing.connection
+import multiprocessing.context
 import os
 import pickle
 import signal
@@ -132,6 +134,25 @@ def remembered(extract, folder):
     return extract_once
 
 
+def forks():
+    """Return what starts the processes of a command as copies of its own, which are warm and remember, too."""
+
+    class Copy(multiprocessing.context.ForkProcess):
+        def run(self):
+            # the other ends of pipes are not for copies: who reads from one is to notice that its owner has closed it
+            mine = {one.fileno() for one in self._args if isinstance(one, multiprocessing.connection.Connection)}
+            for number in map(int, os.listdir("/proc/self/fd")):
+                with contextlib.suppress(OSError):  # the folder itself
+                    if number not in mine and os.readlink(f"/proc/self/fd/{number}").startswith("socket:"):
+                        os.close(number)
+            super().run()
+
+    class Copies(multiprocessing.context.ForkContext):
+        Process = Copy
+
+    return Copies()
+
+
 def load(folder):
     """Import what a run imports, load what it calls, and let extractions be remembered in a folder."""
     import cylx.pipeline
@@ -139,6 +160,8 @@ def load(folder):
 
     warmup.extract_cylinders(warmup.PointCloud(warmup.practice_cloud()), warmup.Config(), threads=1)
     cylx.pipeline.extract_cylinders = remembered(cylx.pipeline.extract_cylinders, folder)
+    copies = forks()
+    multiprocessing.get_context = lambda kind: copies
     assert threading.active_count() == 1, "a process with threads cannot be forked"
 
 
