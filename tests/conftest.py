@@ -21,7 +21,7 @@ settings.load_profile("same")
 # a worker for each core, and no more threads: small matrices take twice as long where threads wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# a shell lets what runs in the background ignore them, and so would all that the tests start; handlers are not inherited
+# what a shell runs in the background ignores them, and so would all that the tests start; handlers are not inherited
 for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", lambda *_: None)):
     if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_IGN:
         signal.signal(getattr(signal, name), handler)

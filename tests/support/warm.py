@@ -141,10 +141,10 @@ def forks():
         def run(self):
             # the other ends of pipes are not for copies: who reads from one is to notice that its owner has closed it
             mine = {one.fileno() for one in self._args if isinstance(one, multiprocessing.connection.Connection)}
-            for number in map(int, os.listdir("/proc/self/fd")):
+            for path in list(Path("/proc/self/fd").iterdir()):
                 with contextlib.suppress(OSError):  # the folder itself
-                    if number not in mine and os.readlink(f"/proc/self/fd/{number}").startswith("socket:"):
-                        os.close(number)
+                    if int(path.name) not in mine and str(path.readlink()).startswith("socket:"):
+                        os.close(int(path.name))
             super().run()
 
     class Copies(multiprocessing.context.ForkContext):
