@@ -103,6 +103,28 @@ class Recorder:
         return tell
 
 
+class WithoutCloud(pickle.Pickler):
+    """Leaves out the cloud of an extraction."""
+
+    def __init__(self, file, cloud):
+        super().__init__(file)
+        self.cloud = cloud
+
+    def persistent_id(self, one):
+        return "the cloud" if one is self.cloud else None
+
+
+class WithCloud(pickle.Unpickler):
+    """Puts the cloud of an extraction where it was left out."""
+
+    def __init__(self, file, cloud):
+        super().__init__(file)
+        self.cloud = cloud
+
+    def persistent_load(self, _):
+        return self.cloud
+
+
 def remembered(extract, folder):
     """Return a function that keeps what an extraction gives, as the same points and settings give the same."""
     from cylx.records import SilentObserver
@@ -114,18 +136,14 @@ def remembered(extract, folder):
         path = folder / hashlib.sha256(b"|".join([cloud.points.tobytes(), valid, about])).hexdigest()
         if path.is_file():
             with path.open("rb") as file:
-                unpickler = pickle.Unpickler(file)
-                unpickler.persistent_load = lambda _: cloud
-                found, told = unpickler.load()
+                found, told = WithCloud(file, cloud).load()
             for name, args in told:
                 getattr(observer, name)(*args)
             return found
         recorder = Recorder(observer)
         found = extract(cloud, config, threads=threads, observer=recorder)
         kept = io.BytesIO()
-        pickler = pickle.Pickler(kept)
-        pickler.persistent_id = lambda one: "the cloud" if one is cloud else None
-        pickler.dump((found, recorder.told))
+        WithoutCloud(kept, cloud).dump((found, recorder.told))
         temporary = path.with_suffix(f".{os.getpid()}")
         temporary.write_bytes(kept.getvalue())
         temporary.replace(path)
