@@ -8,7 +8,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import coordinates_of
-from cylx.records import Finding, IndexedCloud, Segment
+from cylx.records import Finding, IndexedCloud
 
 LEAST_COVERAGE = math.radians(300.0)
 """What hides the middle of a pipe hides it from one side. Of a piece seen all round nothing is hidden at its end."""
