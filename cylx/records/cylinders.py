@@ -14,6 +14,7 @@ from cylx.fits.nominal_radius import Choice, Decision
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, Cylinder
 from cylx.records.clouds import PointCloud, Scene
+from cylx.records.fittings import Piping
 from cylx.records.progress import StageReport
 from cylx.records.shown import html_in_notebook
 from cylx.wording import counted
@@ -280,6 +281,8 @@ class Extraction:
     blends : tuple of CylinderFit or None
         Arcs that go on tangentially: rounds, fillets, slot ends. Ordered as the cylinders; their inliers are the points
         that no cylinder has. None if they were not looked for.
+    piping : Piping or None
+        The fittings and runs of the cylinders; None if they were not looked for.
     """
 
     cylinders: tuple[CylinderFit, ...]
@@ -292,6 +295,7 @@ class Extraction:
     warnings: tuple[str, ...] = ()
     rejected: tuple[RejectedFit, ...] = ()
     blends: tuple[CylinderFit, ...] | None = None
+    piping: Piping | None = None
 
     def __repr__(self) -> str:
         return f"{counted(len(self.cylinders), len(self.blends or ()))} in {len(self.labels)} points"

@@ -18,6 +18,7 @@ from cylx.config import describe_fault
 from cylx.config.choices import Method
 from cylx.errors import InputError
 from cylx.results.cylinders import ResultBlend, ResultCylinder
+from cylx.results.fittings import AnyFitting, ResultRun, fitting_of
 from cylx.results.parts import Count, Input, Length, Part, drop_missing, text_of
 from cylx.results.table import dataframe_of
 from cylx.version import __version__
@@ -25,6 +26,7 @@ from cylx.wording import counted
 
 if TYPE_CHECKING:
     from cylx.records import Extraction, Scene, StageReport, TiledExtraction
+    from cylx.records.fittings import Piping
 
 
 class SceneScale(Part):
@@ -99,6 +101,10 @@ class Result(Part):
     """The cylinders; empty if there are none."""
     blends: list[ResultBlend] | None = None
     """Arcs that go on tangentially, with the keys of a cylinder; absent if they were not looked for."""
+    fittings: list[AnyFitting] | None = None
+    """What joins the cylinders: elbows, tees, reducers, flanges and more; absent if they were not looked for."""
+    runs: list[ResultRun] | None = None
+    """The cylinders that are joined, the longest run first; absent if they were not looked for."""
     warnings: list[str]
     """What a user should know before trusting the result."""
 
@@ -119,6 +125,7 @@ class Result(Part):
             The output of a run.
         """
         blends, tiling = extraction.blends, getattr(extraction, "tiling", None)
+        piping: Piping | None = getattr(extraction, "piping", None)
         return cls(
             cylx_version=__version__,
             input=Input.of(extraction),
@@ -129,6 +136,8 @@ class Result(Part):
             stages=[_stage(report) for report in extraction.stages],
             cylinders=[ResultCylinder.of(i, fit) for i, fit in enumerate(extraction.cylinders)],
             blends=None if blends is None else [ResultBlend.of(i, fit) for i, fit in enumerate(blends)],
+            fittings=None if piping is None else [fitting_of(i, one) for i, one in enumerate(piping.fittings)],
+            runs=None if piping is None else [ResultRun.of(i, run) for i, run in enumerate(piping.runs)],
             warnings=list(extraction.warnings),
         )
 
@@ -184,6 +193,10 @@ class Result(Part):
         lists = {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
         if self.blends is not None:
             lists["blends"] = [blend.to_object() for blend in self.blends]
+        if self.fittings is not None:
+            lists["fittings"] = [fitting.to_object() for fitting in self.fittings]
+        if self.runs is not None:
+            lists["runs"] = [run.to_object() for run in self.runs]
         return content | lists
 
     def __repr__(self) -> str:
