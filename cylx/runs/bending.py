@@ -1,0 +1,350 @@
+"""Elbows between two pipes whose axes meet: proposed by their axes, fitted to the points between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.lines import common_perpendicular
+from cylx.runs.bend import LEAST_TURN, Bend
+from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, tilted
+
+REACH = 30.0
+"""Ends further apart than this many radii are not joined by a bend."""
+WIDEST_BEND = 14.0
+"""Bends of a greater radius, in radii of the pipe, are bent pipes rather than elbows."""
+SAME_RADIUS = 0.12
+"""Radii of one pipe differ by less, beside their uncertainty."""
+SKEW = 0.25
+"""Axes meet if they pass each other within so many radii, beside their uncertainty."""
+OVERSHOOT = 1.5
+"""Straights may have been found so many radii too long: into the bend."""
+MOST_POINTS = 4000
+TRIED = 28
+"""Bend radii that are tried before the fit."""
+BINS = 8
+"""Pieces of the arc, at most, that are asked for points."""
+LEAST_INLIERS = 10
+LEAST_LENGTHWISE = 0.5
+"""Share of the pieces of the arc that must hold points."""
+MOST_INSIDE = 0.5
+"""More points inside than on the surface are none of a pipe."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Meeting:
+    """Two ends whose axes meet.
+
+    Parameters
+    ----------
+    pipes : tuple of int
+    ends : tuple of {'start', 'end'}
+    bend : Bend
+        From the first pipe into the second, with no radius yet.
+    ahead : tuple of float
+        How far ahead of each end the axes meet; negative behind it.
+    """
+
+    pipes: tuple[int, int]
+    ends: tuple[End, End]
+    bend: Bend
+    ahead: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FittedBend:
+    """A bend that was fitted to points.
+
+    Parameters
+    ----------
+    pipes, ends
+        As of the meeting.
+    bend : Bend
+    radius : float
+        Of the tube.
+    indices : ndarray of shape (n,)
+        Points on the arc.
+    rms : float
+    lengthwise : float
+        Share of the arc, in pieces, that has points.
+    coverage : float
+        Share of its surface that has points.
+    inside : float
+        Points inside the tube for each point on it.
+    std : dict of str to float
+    covariances : tuple of ndarray
+        Of the two pipes after the fit.
+    shifts : ndarray of shape (2, 4)
+        By how much the axes of the pipes move: offsets and tilts.
+    """
+
+    pipes: tuple[int, int]
+    ends: tuple[End, End]
+    bend: Bend
+    radius: float
+    indices: IndexArray
+    rms: float
+    lengthwise: float
+    coverage: float
+    inside: float
+    std: dict[str, float]
+    shifts: FloatArray
+
+
+def meetings(pipes: list[Pipe], taken: set[tuple[int, End]]) -> Iterator[Meeting]:
+    """Yield the pairs of free ends whose axes meet ahead of them, at an angle.
+
+    Parameters
+    ----------
+    pipes : list of Pipe
+    taken : set of (int, {'start', 'end'})
+        Ends that have a fitting already.
+    """
+    keys = [(i, end) for i in range(len(pipes)) for end in ENDS if (i, end) not in taken]
+    if len(keys) < 2:
+        return
+    places = np.array([pipes[i].at(end) for i, end in keys])
+    radii = np.array([pipes[i].radius for i, _ in keys])
+    sd = np.array([math.sqrt(max(pipes[i].covariance[4, 4], 0.0)) for i, _ in keys])
+    owners = np.array([i for i, _ in keys])
+    for a, (i, end) in enumerate(keys):
+        smaller = np.minimum(radii, radii[a])
+        near = np.linalg.norm(places - places[a], axis=1) < REACH * smaller
+        alike = np.abs(radii - radii[a]) < SAME_RADIUS * smaller + ON_SURFACE * np.hypot(sd, sd[a])
+        for b in np.flatnonzero(near & alike & (owners > i)):
+            other = keys[int(b)]
+            found = _meeting(pipes[i], end, pipes[other[0]], other[1])
+            if found is not None:
+                yield Meeting((i, other[0]), (end, other[1]), *found)
+
+
+def _meeting(one: Pipe, end: End, two: Pipe, other: End) -> tuple[Bend, tuple[float, float]] | None:
+    """Return the bend, without a radius, of two ends whose axes meet ahead of them."""
+    first, second = one.outward(end), -two.outward(other)
+    turn = math.atan2(float(np.linalg.norm(np.cross(first, second))), float(first @ second))
+    if not LEAST_TURN < turn < math.pi - LEAST_TURN:
+        return None
+    feet = common_perpendicular(one.at(end), first, two.at(other), second)[:2]
+    radius = min(one.radius, two.radius)
+    uncertain = math.hypot(one.axis_deviation(feet[0]), two.axis_deviation(feet[1]))
+    if float(np.linalg.norm(feet[0] - feet[1])) > SKEW * radius + ON_SURFACE * uncertain:
+        return None
+    ahead = float((feet[0] - one.at(end)) @ first), float((two.at(other) - feet[1]) @ second)
+    if min(ahead) < -OVERSHOOT * radius or max(ahead) > REACH * radius:
+        return None
+    return Bend(0.5 * (feet[0] + feet[1]), first, second, 0.0), ahead
+
+
+def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> FittedBend | None:
+    """Fit the bend of two ends to the points about it; None if it does not fit.
+
+    Parameters
+    ----------
+    meeting : Meeting
+    pipes : list of Pipe
+    near : Surroundings
+
+    Returns
+    -------
+    FittedBend or None
+    """
+    one, two = (pipes[i] for i in meeting.pipes)
+    radius, spread = 0.5 * (one.radius + two.radius), max(one.spread, two.spread)
+    slope = math.tan(0.5 * meeting.bend.angle)
+    room = min(meeting.ahead[0] + 0.9 * one.length, meeting.ahead[1] + 0.9 * two.length)
+    most = min(room / slope, WIDEST_BEND * radius)
+    if most <= 0:
+        return None
+    reach = most * slope + 2.0 * radius
+    indices = _zone(meeting.bend, reach, most, radius, (one.source, two.source), near)
+    if len(indices) < LEAST_INLIERS:
+        return None
+    some = indices[:: max(1, len(indices) // MOST_POINTS)]
+    points = near.points[some]
+    tried = np.concatenate([[0.0], np.geomspace(min(0.4 * radius, most), most, TRIED)])
+    costs = _costs(meeting.bend, tried, points, radius, spread)
+    best = int(costs.argmin())
+    fine = np.linspace(tried[max(best - 1, 0)], tried[min(best + 1, TRIED)], 17)
+    costs = _costs(meeting.bend, fine, points, radius, spread)
+    bend = replace(meeting.bend, bend_radius=float(fine[costs.argmin()]))
+    solved = refined(bend, one, two, radius, points, spread)
+    return judged(meeting.pipes, meeting.ends, solved, indices, near, spread)
+
+
+def _zone(
+    bend: Bend, reach: float, most: float, radius: float, own: tuple[int | None, int | None], near: Surroundings
+) -> IndexArray:
+    """Return the free points about all arcs of radii up to `most`."""
+    deep = most * (1.0 / math.cos(0.5 * bend.angle) - 1.0) if bend.angle < math.pi - 0.2 else most
+    outer = 1.8 * radius
+    first = near.about(bend.meeting, bend.first, -reach, outer, outer)
+    second = near.about(bend.meeting, bend.second, -outer, reach, outer)
+    parts = [first, second]
+    if deep > 0.2 * radius:
+        inward = bend.second - bend.first
+        inward /= np.linalg.norm(inward)
+        wide = min(reach, 0.5 * bend.angle * most + radius)
+        middle = bend.meeting + 0.5 * deep * inward
+        parts.append(near.about(middle, bend.normal, -outer, outer, math.hypot(0.5 * deep + outer, wide)))
+    indices = np.unique(np.concatenate(parts))
+    return indices[near.free(indices, own)]
+
+
+def _costs(bend: Bend, radii: FloatArray, points: FloatArray, radius: float, spread: float) -> FloatArray:
+    """Return how badly bends of several radii explain points that some of them explain."""
+    width = ON_SURFACE * spread
+    squares = np.empty((len(radii), len(points)))
+    for k, bend_radius in enumerate(radii):
+        _, distances = replace(bend, bend_radius=float(bend_radius)).coordinates(points)
+        squares[k] = np.minimum(((distances - radius) / width) ** 2, 1.0)
+    # a larger bend is shorter, so that costs count all points that are on any of them
+    return np.asarray(squares[:, (squares < 1.0).any(axis=0)].sum(axis=1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Solved:
+    """A bend after its fit: with the radius of its tube, what moved the pipes, and the covariance of all of it."""
+
+    bend: Bend
+    radius: float
+    change: FloatArray
+    covariance: FloatArray
+
+
+def bend_of(one: Pipe, two: Pipe, ends: tuple[End, End], change: FloatArray, bend_radius: float) -> tuple[Bend, FloatArray]:
+    """Return the bend between two axes after small changes, and by how much they pass each other."""
+    middle, direction = tilted(one, change[:4])
+    other, onward = tilted(two, change[4:8])
+    first = direction if ends[0] == "end" else -direction
+    second = onward if ends[1] == "start" else -onward
+    feet = common_perpendicular(middle, first, other, second)[:2]
+    return Bend(0.5 * (feet[0] + feet[1]), first, second, bend_radius), feet[0] - feet[1]
+
+
+def refined(
+    bend: Bend, one: Pipe, two: Pipe, radius: float, points: FloatArray, spread: float, steps: int = 8
+) -> Solved:
+    """Fit bend radius, tube radius and both axes to the points of the bend, with what is known of the pipes as priors.
+
+    Parameters
+    ----------
+    bend : Bend
+        Start of the fit.
+    one, two : Pipe
+        The pipes; their ends are told by the directions of the bend.
+    radius : float
+        Start of the radius of the tube.
+    points : ndarray of shape (N, 3)
+    spread : float
+        Standard deviation of points about a surface.
+    steps : int
+        Gauss-Newton steps.
+    """
+    ends: tuple[End, End] = (
+        "end" if float(bend.first @ one.direction) > 0 else "start",
+        "start" if float(bend.second @ two.direction) > 0 else "end",
+    )
+    information = np.zeros((10, 10))
+    for place, pipe in ((0, one), (4, two)):
+        known = pipe.covariance[:4, :4] + np.diag([*[(0.002 * radius) ** 2] * 2, *[1e-6] * 2])
+        information[place : place + 4, place : place + 4] = np.linalg.inv(known)
+    tube = 1.0 / max(one.covariance[4, 4], 1e-300) + 1.0 / max(two.covariance[4, 4], 1e-300)
+    information[8, 8] = 1.0 / (1.0 / tube + (0.01 * radius) ** 2)
+    base = np.zeros(10)
+    base[8], base[9] = radius, bend.bend_radius
+    state = base.copy()
+    small = np.array([*[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2])
+    skewed = 0.02 * radius
+
+    def residuals(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        shape, skew = bend_of(one, two, ends, values, max(float(values[9]), 0.0))
+        along, distances = shape.coordinates(points)
+        return along, distances - values[8], skew
+
+    covariance = np.linalg.inv(information + np.diag([*[0.0] * 9, 1e-12 / radius**2]))
+    for _ in range(steps):
+        along, errors, skew = residuals(state)
+        length = max(state[9], 0.0) * bend.angle
+        # points of the straights are in their priors already
+        beside = np.maximum(np.maximum(-along, along - length), 0.0)
+        weights = np.maximum(1.0 - (errors / (ON_SURFACE * 1.5 * spread)) ** 2, 0.0) ** 2
+        weights *= np.where(beside > 2.0 * radius, 0.0, np.where(beside > 0.0, 0.25, 1.0)) / spread**2
+        jacobian, bending = np.empty((len(points), 10)), np.empty((3, 10))
+        for k in range(10):
+            moved = state.copy()
+            moved[k] += small[k]
+            _, shifted, skewing = residuals(moved)
+            jacobian[:, k], bending[:, k] = (shifted - errors) / small[k], (skewing - skew) / small[k]
+        normal = information + (jacobian * weights[:, None]).T @ jacobian + bending.T @ bending / skewed**2
+        normal[9, 9] += 1e-9 / radius**2
+        gradient = information @ (state - base) + jacobian.T @ (weights * errors) + bending.T @ skew / skewed**2
+        gradient[9] -= information[9, 9] * (state[9] - base[9])
+        covariance = np.linalg.inv(normal)
+        step = covariance @ gradient
+        state = state - step
+        state[9] = max(state[9], 0.0)
+        if float(np.abs(step / small).max()) < 1.0:
+            break
+    shape, _ = bend_of(one, two, ends, state, float(state[9]))
+    return Solved(shape, float(state[8]), state[:8] - base[:8], covariance)
+
+
+def judged(
+    pipes: tuple[int, int],
+    ends: tuple[End, End],
+    solved: Solved,
+    indices: IndexArray,
+    near: Surroundings,
+    spread: float,
+) -> FittedBend | None:
+    """Return a fitted bend with its evidence; None if the points do not show it."""
+    bend, radius = solved.bend, solved.radius
+    along, distances = bend.coordinates(near.points[indices])
+    errors = distances - radius
+    width = ON_SURFACE * spread + 0.01 * radius
+    # of a mitre, the points about the corner
+    margin = max(0.0, 0.5 * radius * math.tan(0.5 * bend.angle) - 0.5 * bend.length)
+    on_arc = (along > -margin) & (along < bend.length + margin)
+    inside = on_arc & (errors < -width - 0.1 * radius)
+    own = on_arc & (np.abs(errors) < width)
+    count = int(own.sum())
+    if count < LEAST_INLIERS or inside.sum() > MOST_INSIDE * count:
+        return None
+    length = bend.length + 2.0 * margin
+    pieces = int(np.clip(length / max(2.0 * near.spacing, 1e-12), 1, BINS))
+    rows = np.clip(((along[own] + margin) / length * pieces).astype(np.int64), 0, pieces - 1)
+    lengthwise = len(np.unique(rows)) / pieces
+    if lengthwise < LEAST_LENGTHWISE:
+        return None
+    center = bend.meeting if bend.bend_radius == 0 else bend.center
+    points = near.points[indices[own]]
+    radial = points - center
+    # angle about the tube: from the outside of the bend
+    high = radial @ bend.normal
+    out = np.hypot(radial @ bend.first, radial @ bend.inward) - bend.bend_radius
+    sector = np.floor((np.arctan2(high, out) / (2 * math.pi) + 0.5) * 12).astype(np.int64) % 12
+    coverage = len(np.unique(rows * 12 + sector)) / (12.0 * pieces)
+    turn = solved.covariance[2:4, 2:4] + solved.covariance[6:8, 6:8]
+    std = {
+        "bend_radius": math.sqrt(max(solved.covariance[9, 9], 0.0)),
+        "angle_deg": math.degrees(math.sqrt(max(0.5 * np.trace(turn), 0.0))),
+        "radius": math.sqrt(max(solved.covariance[8, 8], 0.0)),
+    }
+    rms = float(np.sqrt((errors[own] ** 2).mean()))
+    return FittedBend(
+        pipes,
+        ends,
+        bend,
+        radius,
+        indices[own],
+        rms,
+        lengthwise,
+        coverage,
+        float(inside.sum()) / count,
+        std,
+        solved.change.reshape(2, 4),
+    )
