@@ -180,7 +180,7 @@ def _true_fittings(
                 joining.geometry,
                 int(present[index]),
                 seen,
-                hardly or loose or joining.part_of is not None,
+                bool(hardly or loose or joining.part_of is not None or joining.kind == "joint"),
                 joining.part_of,
             )
         )
