@@ -76,10 +76,10 @@ class FittedBend:
     inside : float
         Points inside the tube for each point on it.
     std : dict of str to float
-    covariances : tuple of ndarray
-        Of the two pipes after the fit.
     shifts : ndarray of shape (2, 4)
         By how much the axes of the pipes move: offsets and tilts.
+    covariances : ndarray of shape (2, 4, 4)
+        Of the two axes after the fit.
     """
 
     pipes: tuple[int, int]
@@ -93,6 +93,7 @@ class FittedBend:
     inside: float
     std: dict[str, float]
     shifts: FloatArray
+    covariances: FloatArray
 
 
 def meetings(pipes: list[Pipe], taken: set[tuple[int, End]]) -> Iterator[Meeting]:
@@ -215,7 +216,9 @@ class Solved:
     covariance: FloatArray
 
 
-def bend_of(one: Pipe, two: Pipe, ends: tuple[End, End], change: FloatArray, bend_radius: float) -> tuple[Bend, FloatArray]:
+def bend_of(
+    one: Pipe, two: Pipe, ends: tuple[End, End], change: FloatArray, bend_radius: float
+) -> tuple[Bend, FloatArray]:
     """Return the bend between two axes after small changes, and by how much they pass each other."""
     middle, direction = tilted(one, change[:4])
     other, onward = tilted(two, change[4:8])
@@ -290,7 +293,8 @@ def refined(
         if float(np.abs(step / small).max()) < 1.0:
             break
     shape, _ = bend_of(one, two, ends, state, float(state[9]))
-    return Solved(shape, float(state[8]), state[:8] - base[:8], covariance)
+    change = np.asarray(state[:8] - base[:8], dtype=np.float64)
+    return Solved(shape, float(state[8]), change, np.asarray(covariance, dtype=np.float64))
 
 
 def judged(
@@ -347,4 +351,5 @@ def judged(
         float(inside.sum()) / count,
         std,
         solved.change.reshape(2, 4),
+        np.stack([solved.covariance[:4, :4], solved.covariance[4:8, 4:8]]),
     )

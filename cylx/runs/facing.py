@@ -193,9 +193,7 @@ def _search(
         grid = np.linspace(-step, step, 7)
         tried = [(low + float(a), high + float(b)) for a in grid for b in grid if high + b - low - a > 0.1 * change]
     width = ON_SURFACE * spread
-    costs = [
-        float(np.minimum((shape.errors(points, heights, *one) / width) ** 2, 1.0).sum()) for one in tried
-    ]
+    costs = [float(np.minimum((shape.errors(points, heights, *one) / width) ** 2, 1.0).sum()) for one in tried]
     return tried[int(np.argmin(costs))]
 
 

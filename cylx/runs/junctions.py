@@ -93,7 +93,10 @@ def _branching(pipes: list[Pipe], i: int, end: End, j: int) -> Branching | None:
     if float((root - branch.at(end)) @ outward) < -1.3 * main.radius:
         return None
     tilts = branch.covariance[2:4, 2:4] + main.covariance[2:4, 2:4]
-    std = {"angle_deg": math.degrees(math.sqrt(max(0.5 * float(np.trace(tilts)), 0.0))), "center": uncertain / ON_SURFACE}
+    std = {
+        "angle_deg": math.degrees(math.sqrt(max(0.5 * float(np.trace(tilts)), 0.0))),
+        "center": uncertain / ON_SURFACE,
+    }
     return Branching(j, i, end, center, root, angle, gap, std)
 
 

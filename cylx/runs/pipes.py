@@ -21,6 +21,8 @@ UNKNOWN_TILT, UNKNOWN_OFFSET = 0.01, 0.03
 """Standard deviations of a cylinder whose covariance is not known: of a tilt, and of the others in radii."""
 LEAST_SPREAD = 0.004
 """Real pipes deviate from cylinders by as much at least, in radii."""
+CLAIMED = np.iinfo(np.int32).max
+"""Label of points that belong to a fitting."""
 ON_SURFACE = 3.0
 """Points within so many standard deviations are on a surface."""
 
@@ -40,8 +42,6 @@ class Pipe:
         Of two offsets at the middle of its axis, two tilts and the radius, as in `CylinderFit`.
     source : int or None
         Index of the cylinder that it was; None for one that was found along a run.
-    rims : tuple of int
-        Indices of cylinders that belong to its fittings.
     """
 
     start: FloatArray
@@ -143,11 +143,20 @@ class Surroundings:
         unit = max(0.5 * spacing, side / (2.0**BITS - 2), 1e-300)
         codes = morton_codes(points - corner, unit)
         self.order = np.argsort(codes, kind="stable")
+        self.places = np.empty(len(points), np.int64)
+        self.places[self.order] = np.arange(len(points))
         self.points = np.ascontiguousarray((points - self.origin)[self.order])
         self.labels = np.asarray(labels)[self.order]
         self.cells = Cells(self.points, codes[self.order]) if len(points) else None
         self.spacing, self.noise = spacing, noise
-        self.low, self.high = corner - self.origin, corner + np.ptp(points, axis=0) - self.origin if len(points) else corner
+        self.low, self.high = (
+            corner - self.origin,
+            corner + np.ptp(points, axis=0) - self.origin if len(points) else corner,
+        )
+
+    def origin_points(self, indices: IndexArray) -> FloatArray:
+        """Return points of the cloud, by their indices in it, in coordinates about its middle."""
+        return self.points[self.places[indices]]
 
     def about(
         self, point: FloatArray, direction: FloatArray, low: float, high: float, outer: float, inner: float = 0.0
@@ -165,6 +174,10 @@ class Surroundings:
             if source is not None:
                 out |= labels == source
         return out
+
+    def claim(self, indices: IndexArray) -> None:
+        """Give points to a fitting: they are free no more."""
+        self.labels[indices] = CLAIMED
 
     def density(self, pipe: Pipe) -> float:
         """Return the points per area on a pipe's own surface, as if all of it were seen; 0 without points."""

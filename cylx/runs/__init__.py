@@ -1,0 +1,77 @@
+"""Runs: the cylinders of a cloud joined by their fittings, which are proposed by their axes and fitted to its points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.fits.nominal_radius import Catalogue
+from cylx.geometry.arrays import FloatArray
+from cylx.records import CylinderFit
+from cylx.runs.answer import Traced, answer_of
+from cylx.runs.graph import find_runs
+from cylx.runs.onward import follow_ends
+from cylx.runs.pipes import Pipe, Surroundings
+from cylx.runs.tracing import (
+    Trace,
+    add_bends,
+    add_caps,
+    add_collars,
+    add_gaps,
+    add_junctions,
+    add_reducers,
+    drop_parts,
+)
+
+__all__ = ["Traced", "trace_runs"]
+
+
+def trace_runs(
+    fits: Sequence[CylinderFit],
+    points: FloatArray,
+    labels: NDArray[np.int32],
+    *,
+    spacing: float,
+    noise: float,
+    catalogue: Catalogue | None = None,
+    names: Sequence[str | None] = (),
+) -> Traced:
+    """Join the cylinders of a cloud to runs, and find and fit what joins them.
+
+    Parameters
+    ----------
+    fits : sequence of CylinderFit
+        The cylinders.
+    points : ndarray of shape (N, 3)
+        The cloud, scene units; without points the fittings are those that the axes tell.
+    labels : ndarray of shape (N,)
+        Cylinder of each point, -1 for none.
+    spacing, noise : float
+        Of the cloud, scene units.
+    catalogue : Catalogue, optional
+        Nominal radii, scene units: decided for all pipes of a size of a run together.
+    names : sequence of str or None
+        Names of its entries.
+
+    Returns
+    -------
+    Traced
+    """
+    near = Surroundings(points, labels, spacing, noise)
+    trace = Trace([Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)], near)
+    add_bends(trace, near)
+    add_reducers(trace, near)
+    add_junctions(trace, near)
+    while follow_ends(trace, near):
+        add_bends(trace, near)
+        add_reducers(trace, near)
+        add_junctions(trace, near)
+    add_collars(trace, near)
+    add_gaps(trace, near)
+    add_caps(trace, near)
+    trace = drop_parts(trace)
+    runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)
+    return answer_of(trace, runs, fits, near, labels)

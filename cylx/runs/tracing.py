@@ -1,0 +1,352 @@
+"""Which of the proposed fittings are there: each end of a pipe has one at most, the best supported first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.cylinder import canonical_direction
+from cylx.records import Cap, Cross, Elbow, Fitting, Flange, Inline, Joint, Junction, Reducer
+from cylx.runs.bending import FittedBend, fit_meeting, meetings
+from cylx.runs.collars import Collar, collars_of
+from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
+from cylx.runs.junctions import Branching, branchings
+from cylx.runs.pipes import ENDS, End, Pipe, Surroundings, tilted
+
+CROSSING = 0.5
+"""Branches that face each other meet the main within so many of its radii of each other."""
+BETTER = 0.8
+"""An axis moves with a fit that leaves it less than this share of its deviations."""
+
+
+@dataclass(slots=True)
+class Trace:
+    """The pipes and fittings found so far.
+
+    Parameters
+    ----------
+    pipes : list of Pipe
+    near : Surroundings
+    fittings : list of Fitting
+        Their `joins` are indices of pipes.
+    points : list of ndarray
+        Indices of the points of each fitting.
+    taken : dict of (int, {'start', 'end'}) to int
+        Fitting at each end that has one.
+    """
+
+    pipes: list[Pipe]
+    near: Surroundings
+    fittings: list[Fitting] = field(default_factory=list)
+    points: list[IndexArray] = field(default_factory=list)
+    taken: dict[tuple[int, End], int] = field(default_factory=dict)
+
+    def add(self, fitting: Fitting, points: IndexArray) -> None:
+        """Add a fitting; the ends it joins are taken."""
+        for pipe, end in zip(fitting.joins, fitting.ends, strict=True):
+            if end != "side":
+                self.taken[pipe, end] = len(self.fittings)
+        self.fittings.append(fitting)
+        self.points.append(points)
+        self.near.claim(points)
+
+    def is_free(self, keys: Iterable[tuple[int, End]]) -> bool:
+        """Return whether ends have no fitting yet."""
+        return not any(key in self.taken for key in keys)
+
+
+def trust(inliers: int, lengthwise: float, wrong: float = 0.0) -> float:
+    """Return the confidence of a fitting: by its points, the share of its length they cover, and points against it."""
+    return float(np.clip((1.0 - np.exp(-inliers / 10.0)) * (0.4 + 0.6 * lengthwise) * (1.0 - 0.5 * wrong), 0.0, 0.99))
+
+
+def add_bends(trace: Trace, near: Surroundings) -> int:
+    """Add the elbows between pipes whose axes meet; return their number."""
+    tried = (fit_meeting(meeting, trace.pipes, near) for meeting in meetings(trace.pipes, set(trace.taken)))
+    found = sorted((one for one in tried if one is not None), key=lambda one: (-one.lengthwise, -len(one.indices)))
+    count = 0
+    for one in found:
+        if trace.is_free(zip(one.pipes, one.ends, strict=True)):
+            add_bend(trace, one)
+            count += 1
+    return count
+
+
+def add_bend(trace: Trace, one: FittedBend) -> None:
+    """Add an elbow, and let its pipes end where it begins."""
+    bend = one.bend
+    for k, (index, end) in enumerate(zip(one.pipes, one.ends, strict=True)):
+        pipe = with_axis(trace.pipes[index], one.shifts[k], one.covariances[k])
+        trace.pipes[index] = pipe.with_end(end, bend.start if k == 0 else bend.end)
+    fitting = Elbow(
+        joins=one.pipes,
+        ends=one.ends,
+        confidence=trust(len(one.indices), one.lengthwise, one.inside),
+        inliers=len(one.indices),
+        rms=one.rms,
+        coverage=one.coverage,
+        std=one.std,
+        center=bend.center,
+        normal=bend.normal,
+        bend_radius=bend.bend_radius,
+        angle=bend.angle,
+        radius=one.radius,
+        start=bend.start,
+        end=bend.end,
+    )
+    trace.add(fitting, one.indices)
+
+
+def with_axis(pipe: Pipe, change: FloatArray, covariance: FloatArray) -> Pipe:
+    """Return a pipe after a fit with its neighbour, if the fit knows its axis clearly better than before."""
+    if float(np.trace(covariance[2:4, 2:4])) > BETTER**2 * float(np.trace(pipe.covariance[2:4, 2:4])):
+        return pipe
+    middle, direction = tilted(pipe, change)
+    if float(canonical_direction(direction) @ direction) < 0:  # its ends, and its covariance, go by the sign
+        return pipe
+    joined = pipe.covariance.copy()
+    joined[:4, :4] = covariance
+    joined[4, :4] = joined[:4, 4] = 0.0
+    half = 0.5 * pipe.length * direction
+    return replace(pipe, start=middle - half, end=middle + half, covariance=joined)
+
+
+def add_reducers(trace: Trace, near: Surroundings) -> int:
+    """Add the reducers between ends of different radius that face each other; return their number."""
+    pairs = (one for one in facing_ends(trace.pipes, set(trace.taken)) if not one.same_size)
+    tried = (fit_reducer(one, trace.pipes, near) for one in pairs)
+    found = sorted((one for one in tried if one is not None), key=lambda one: -len(one.indices))
+    count = 0
+    for one in found:
+        if trace.is_free(zip(one.facing.pipes, one.facing.ends, strict=True)):
+            _add_reducer(trace, one)
+            count += 1
+    return count
+
+
+def _add_reducer(trace: Trace, one: FittedCone) -> None:
+    """Add a reducer, and let its pipes end where it begins."""
+    facing = one.facing
+    for index, end, place in zip(facing.pipes, facing.ends, (one.start, one.end), strict=True):
+        trace.pipes[index] = trace.pipes[index].with_end(end, place)
+    first, second = (trace.pipes[i] for i in facing.pipes)
+    fitting = Reducer(
+        joins=facing.pipes,
+        ends=facing.ends,
+        confidence=trust(len(one.indices), one.lengthwise),
+        inliers=len(one.indices),
+        rms=one.rms,
+        coverage=one.coverage,
+        std=one.std,
+        start=one.start,
+        end=one.end,
+        start_radius=first.radius,
+        end_radius=second.radius,
+        offset=facing.offset,
+        concentric=facing.offset < max(0.4 * abs(first.radius - second.radius), 2.0 * one.std["offset"]),
+    )
+    trace.add(fitting, one.indices)
+
+
+def add_junctions(trace: Trace, near: Surroundings) -> int:
+    """Add the tees and crosses; return their number."""
+    found = list(branchings(trace.pipes, set(trace.taken), near))
+    used: set[int] = set()
+    count = 0
+    for k, one in enumerate(found):
+        if k in used:
+            continue
+        group = [one]
+        for m in range(k + 1, len(found)):
+            other = found[m]
+            apart = float(np.linalg.norm(other.center - one.center))
+            against = trace.pipes[one.branch].outward(one.end) @ trace.pipes[other.branch].outward(other.end)
+            if (
+                m not in used
+                and other.main == one.main
+                and apart < CROSSING * trace.pipes[one.main].radius
+                and against < -0.9
+            ):
+                group.append(other)
+                used.add(m)
+                break
+        _add_junction(trace, group, near)
+        count += 1
+    return count
+
+
+def _add_junction(trace: Trace, group: list[Branching], near: Surroundings) -> None:
+    """Add a tee, or a cross of two branchings."""
+    first = group[0]
+    branches = tuple(one.branch for one in group)
+    contact = 1.0 / (1.0 + max(0.0, first.gap / trace.pipes[first.branch].radius - 1.0))
+    kind = Junction if len(group) == 1 else Cross
+    fitting = kind(
+        joins=(first.main, *branches),
+        ends=("side", *(one.end for one in group)),
+        confidence=0.6 + 0.35 * contact,
+        center=first.center,
+        main=(first.main,),
+        branches=branches,
+        angle=first.angle,
+        std=first.std,
+    )
+    trace.add(fitting, np.empty(0, np.int64))
+
+
+def add_collars(trace: Trace, near: Surroundings) -> int:
+    """Add the flanges on pipes, and what is between them; return their number."""
+    count = 0
+    for index in range(len(trace.pipes)):
+        shut = (index, "start") in trace.taken, (index, "end") in trace.taken
+        for collar in collars_of(index, trace.pipes, near, shut):
+            _add_collar(trace, index, collar)
+            count += 1
+    return count
+
+
+def _add_collar(trace: Trace, index: int, collar: Collar) -> None:
+    pipe = trace.pipes[index]
+    if collar.kind == "flange":
+        trace.add(
+            Flange(
+                joins=(index,),
+                ends=(collar.where,),
+                confidence=collar.confidence,
+                inliers=len(collar.indices),
+                rms=collar.rms,
+                coverage=collar.coverage,
+                std=collar.std,
+                center=collar.center,
+                axis=pipe.direction,
+                radius=collar.radius,
+                thickness=collar.thickness,
+                pair=collar.pair,
+            ),
+            collar.indices,
+        )
+        return
+    half = 0.5 * collar.thickness * pipe.direction
+    trace.add(
+        Inline(
+            joins=(index,),
+            ends=("side",),
+            confidence=collar.confidence,
+            inliers=len(collar.indices),
+            coverage=collar.coverage,
+            start=collar.center - half,
+            end=collar.center + half,
+        ),
+        collar.indices,
+    )
+
+
+def add_gaps(trace: Trace, near: Surroundings) -> int:
+    """Add what bridges gaps between ends of one size; return their number."""
+    pairs = sorted(
+        (one for one in facing_ends(trace.pipes, set(trace.taken)) if one.same_size), key=lambda one: abs(one.gap)
+    )
+    count = 0
+    for one in pairs:
+        if trace.is_free(zip(one.pipes, one.ends, strict=True)):
+            _add_gap(trace, one, near)
+            count += 1
+    return count
+
+
+def _add_gap(trace: Trace, one: Facing, near: Surroundings) -> None:
+    first, second = (trace.pipes[i] for i in one.pipes)
+    start, end = first.at(one.ends[0]), second.at(one.ends[1])
+    radius, axis = first.radius, first.outward(one.ends[0])
+    inner = near.about(start, axis, 0.1 * one.gap, 0.9 * one.gap, 3.0 * radius, 1.2 * radius)
+    inner = inner[near.free(inner)]
+    tube = near.about(start, axis, 0.0, max(one.gap, 0.0), 1.1 * radius, 0.9 * radius)
+    if len(inner) > 0.5 * near.density(first) * 2 * np.pi * radius * max(one.gap, 0.0) and len(inner) > 20:
+        fitting: Fitting = Inline(
+            joins=one.pipes, ends=one.ends, confidence=0.6, inliers=len(inner), start=start, end=end
+        )
+        trace.add(fitting, inner)
+        return
+    fitting = Joint(
+        joins=one.pipes,
+        ends=one.ends,
+        confidence=0.5 + 0.4 / (1.0 + max(one.gap, 0.0) / (4.0 * radius)),
+        start=start,
+        end=end,
+        length=float(np.linalg.norm(end - start)),
+        assumed=len(tube) < 10 and one.gap > radius,
+    )
+    trace.add(fitting, np.empty(0, np.int64))
+
+
+def add_caps(trace: Trace, near: Surroundings) -> int:
+    """Add the caps of ends that nothing joins; return their number."""
+    from cylx.runs.caps import fit_cap  # noqa: PLC0415
+
+    count = 0
+    for index, pipe in enumerate(trace.pipes):
+        for end in ENDS:
+            if (index, end) in trace.taken:
+                continue
+            cap = fit_cap(pipe, end, near)
+            if cap is not None:
+                fitting = Cap(
+                    joins=(index,),
+                    ends=(end,),
+                    confidence=trust(len(cap.indices), cap.coverage),
+                    inliers=len(cap.indices),
+                    rms=cap.rms,
+                    coverage=cap.coverage,
+                    std={"center": cap.std},
+                    center=cap.center,
+                    axis=pipe.outward(end),
+                    radius=pipe.radius,
+                )
+                trace.add(fitting, cap.indices)
+                count += 1
+    return count
+
+
+def drop_parts(trace: Trace) -> Trace:
+    """Return what was traced without the pipes that are parts of fittings, such as the rims of flanges."""
+    joined = {pipe for fitting in trace.fittings for pipe in fitting.joins if fitting.kind not in _OF_ONE}
+    parts = set()
+    for fitting in trace.fittings:
+        if isinstance(fitting, Flange | Inline):
+            axis = trace.pipes[fitting.joins[0]].direction
+            low, high, reach = _extent_of(fitting, axis)
+            for k, pipe in enumerate(trace.pipes):
+                if k in fitting.joins or k in joined:
+                    continue
+                away = pipe.middle - 0.5 * (low + high)
+                along = float(away @ axis)
+                beside = float(np.linalg.norm(away - along * axis))
+                inside = abs(along) + 0.4 * pipe.length < 0.5 * float(np.linalg.norm(high - low)) + 0.3 * reach
+                if inside and beside + pipe.radius < 1.15 * reach:
+                    parts.add(k)
+    kept = [k for k in range(len(trace.pipes)) if k not in parts]
+    number = {old: new for new, old in enumerate(kept)}
+    out = Trace([trace.pipes[k] for k in kept], trace.near)
+    for fitting, points in zip(trace.fittings, trace.points, strict=True):
+        if fitting.joins[0] in parts:
+            continue
+        moved = replace(fitting, joins=tuple(number[k] for k in fitting.joins))
+        if isinstance(moved, Junction):
+            main, branches = (tuple(number[k] for k in group) for group in (moved.main, moved.branches))
+            moved = replace(moved, main=main, branches=branches)
+        out.add(moved, points)
+    return out
+
+
+_OF_ONE = ("cap", "flange", "inline")
+
+
+def _extent_of(fitting: Flange | Inline, axis: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return both ends of a fitting on its axis, and how far it reaches from it."""
+    if isinstance(fitting, Flange):
+        half = 0.5 * fitting.thickness * axis
+        return fitting.center - half, fitting.center + half, fitting.radius
+    return fitting.start, fitting.end, 0.5 * float(np.linalg.norm(fitting.end - fitting.start))
