@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ from cylx.records import CylinderFit
 from cylx.runs.answer import Traced, answer_of
 from cylx.runs.graph import find_runs
 from cylx.runs.onward import follow_ends
+from cylx.runs.pieces import settled, split_crossings
 from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.tracing import (
     Trace,
@@ -24,6 +24,7 @@ from cylx.runs.tracing import (
     add_junctions,
     add_reducers,
     drop_parts,
+    trim,
 )
 
 __all__ = ["Traced", "trace_runs"]
@@ -61,7 +62,11 @@ def trace_runs(
     Traced
     """
     near = Surroundings(points, labels, spacing, noise)
-    trace = Trace([Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)], near)
+    pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
+    trace = Trace(split_crossings(settled(pipes, near), near), near)
+    add_bends(trace, near)
+    add_reducers(trace, near)
+    trace = Trace(trim(trace, near), near)  # straights that were found too long have bent with their fittings
     add_bends(trace, near)
     add_reducers(trace, near)
     add_junctions(trace, near)
@@ -74,4 +79,4 @@ def trace_runs(
     add_caps(trace, near)
     trace = drop_parts(trace)
     runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)
-    return answer_of(trace, runs, fits, near, labels)
+    return answer_of(trace, runs, fits, near)

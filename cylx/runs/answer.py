@@ -12,7 +12,7 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.records import CylinderFit, Fitting, PipeRun, Piping
-from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings
+from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.tracing import Trace
 
 PLACES = ("center", "start", "end")
@@ -44,25 +44,21 @@ class Traced:
     piping: Piping
 
 
-def answer_of(
-    trace: Trace, runs: tuple[PipeRun, ...], fits: Sequence[CylinderFit], near: Surroundings, labels: NDArray[np.int32]
-) -> Traced:
+def answer_of(trace: Trace, runs: tuple[PipeRun, ...], fits: Sequence[CylinderFit], near: Surroundings) -> Traced:
     """Put what was traced into scene units, and label the points."""
-    count = len(labels)
+    count = len(near.points)
     owners, fitting_of = np.full(count, -1, np.int32), np.full(count, -1, np.int32)
     for k, points in enumerate(trace.points):
         fitting_of[near.order[points]] = k
-    for k, pipe in enumerate(trace.pipes):
-        if pipe.source is not None:
-            owners[labels == pipe.source] = k
-    owners[fitting_of >= 0] = -1
+    number = {pipe.label: k for k, pipe in enumerate(trace.pipes)}
+    for label, k in number.items():
+        owners[near.order[near.labels == label]] = k
     residuals = np.full(count, np.nan, np.float32)
     cylinders = []
     for k, pipe in enumerate(trace.pipes):
         if pipe.source is None:
-            own = _own_points(pipe, near)
-            own = own[(owners[own] < 0) & (fitting_of[own] < 0)]
-            owners[own] = k
+            own = near.order[near.on(pipe)]
+            owners[own[owners[own] < 0]] = k
         own = np.flatnonzero(owners == k)
         _, distances, angles = cylinder_coordinates(near.origin_points(own), pipe.middle, pipe.direction)
         errors = distances - pipe.radius
@@ -71,14 +67,6 @@ def answer_of(
     fittings = tuple(_moved(one, near.origin) for one in trace.fittings)
     sources = tuple(pipe.source for pipe in trace.pipes)
     return Traced(tuple(cylinders), sources, owners, residuals, Piping(fittings, runs, fitting_of))
-
-
-def _own_points(pipe: Pipe, near: Surroundings) -> NDArray[np.int64]:
-    """Return the indices in the cloud of the free points on a pipe."""
-    half, reach = 0.5 * pipe.length, ON_SURFACE * pipe.spread
-    inner = max(0.0, pipe.radius - reach)
-    found = near.about(pipe.middle, pipe.direction, -half, half, pipe.radius + reach, inner)
-    return np.asarray(near.order[found[near.free(found)]])
 
 
 def _cylinder(

@@ -161,7 +161,7 @@ def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> Fitt
     if most <= 0:
         return None
     reach = most * slope + 2.0 * radius
-    indices = _zone(meeting.bend, reach, most, radius, (one.source, two.source), near)
+    indices = _zone(meeting.bend, reach, most, radius, (one.label, two.label), near)
     if len(indices) < LEAST_INLIERS:
         return None
     some = indices[:: max(1, len(indices) // MOST_POINTS)]
@@ -176,9 +176,7 @@ def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> Fitt
     return judged(meeting.pipes, meeting.ends, solved, indices, near, spread)
 
 
-def _zone(
-    bend: Bend, reach: float, most: float, radius: float, own: tuple[int | None, int | None], near: Surroundings
-) -> IndexArray:
+def _zone(bend: Bend, reach: float, most: float, radius: float, own: tuple[int, int], near: Surroundings) -> IndexArray:
     """Return the free points about all arcs of radii up to `most`."""
     deep = most * (1.0 / math.cos(0.5 * bend.angle) - 1.0) if bend.angle < math.pi - 0.2 else most
     outer = 1.8 * radius

@@ -43,7 +43,7 @@ def fit_cap(pipe: Pipe, end: End, near: Surroundings) -> FittedCap | None:
     """
     radius, place, axis = pipe.radius, pipe.at(end), pipe.outward(end)
     indices = near.about(place, axis, -radius, FURTHEST * radius, radius)
-    indices = indices[near.free(indices, (pipe.source,))]
+    indices = indices[near.free(indices, (pipe.label,))]
     points = near.points[indices]
     heights = (points - place) @ axis
     square = np.einsum("ij,ij->i", points - place, points - place) - heights**2

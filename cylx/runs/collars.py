@@ -90,7 +90,7 @@ def collars_of(index: int, pipes: list[Pipe], near: Surroundings, shut: tuple[bo
     others = coaxial(index, pipes)
     rims = [k for k in others if pipes[k].length < LONGEST_FLANGE * pipes[k].radius]
     covers = [k for k in others if k not in rims]
-    ring = _ring(pipe, near, [pipes[k].source for k in rims], shut)
+    ring = _ring(pipe, near, [pipes[k].label for k in rims], shut)
     if len(ring.indices) < LEAST_POINTS:
         return []
     out = []
@@ -119,7 +119,7 @@ def coaxial(index: int, pipes: list[Pipe]) -> list[int]:
     return out
 
 
-def _ring(pipe: Pipe, near: Surroundings, rims: list[int | None], shut: tuple[bool, bool]) -> _Ring:
+def _ring(pipe: Pipe, near: Surroundings, rims: list[int], shut: tuple[bool, bool]) -> _Ring:
     low = 0.0 if shut[0] else -1.5 * pipe.radius
     high = pipe.length + (0.0 if shut[1] else 1.5 * pipe.radius)
     inner = NARROWEST * pipe.radius + ON_SURFACE * pipe.spread

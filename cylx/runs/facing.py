@@ -131,7 +131,7 @@ def fit_reducer(facing: Facing, pipes: list[Pipe], near: Surroundings) -> Fitted
     spread = max(one.spread, two.spread)
     before, after = min(OVERLAP * large, 0.8 * one.length), min(OVERLAP * large, 0.8 * two.length)
     indices = near.about(first, axis, -before - large, facing.gap + after + large, 1.4 * large + facing.offset)
-    indices = indices[near.free(indices, (one.source, two.source))]
+    indices = indices[near.free(indices, (one.label, two.label))]
     if len(indices) < LEAST_INLIERS:
         return None
     points = near.points[indices[:: max(1, len(indices) // MOST_POINTS)]]

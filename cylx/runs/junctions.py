@@ -110,4 +110,4 @@ def _arrives(found: Branching, pipes: list[Pipe], near: Surroundings) -> bool:
     place, outward = branch.at(found.end), branch.outward(found.end)
     first = near.about(place, outward, 0.0, 0.5 * found.gap, branch.radius + reach, inner)
     last = near.about(place, outward, 0.5 * found.gap, found.gap, branch.radius + reach, inner)
-    return min(int(near.free(one, (branch.source,)).sum()) for one in (first, last)) >= SEEN
+    return min(int(near.free(one, (branch.label,)).sum()) for one in (first, last)) >= SEEN

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -40,6 +41,8 @@ class Pipe:
         Standard deviation of its points about its surface.
     covariance : ndarray of shape (5, 5)
         Of two offsets at the middle of its axis, two tilts and the radius, as in `CylinderFit`.
+    label : int
+        What `Surroundings` calls its points.
     source : int or None
         Index of the cylinder that it was; None for one that was found along a run.
     """
@@ -49,6 +52,7 @@ class Pipe:
     radius: float
     spread: float
     covariance: FloatArray
+    label: int
     source: int | None = None
 
     @classmethod
@@ -59,7 +63,7 @@ class Pipe:
         unknown = np.diag([offset**2, offset**2, tilt**2, tilt**2, offset**2])
         covariance = unknown if fit.covariance is None else np.asarray(fit.covariance, np.float64)
         spread = max(fit.rmse if fit.inliers else noise, LEAST_SPREAD * shape.radius)
-        return cls(shape.start - origin, shape.end - origin, shape.radius, spread, covariance, index)
+        return cls(shape.start - origin, shape.end - origin, shape.radius, spread, covariance, index, index)
 
     @property
     def length(self) -> float:
@@ -146,7 +150,8 @@ class Surroundings:
         self.places = np.empty(len(points), np.int64)
         self.places[self.order] = np.arange(len(points))
         self.points = np.ascontiguousarray((points - self.origin)[self.order])
-        self.labels = np.asarray(labels)[self.order]
+        self.labels = np.asarray(labels, np.int32)[self.order]
+        self._next = int(self.labels.max(initial=-1)) + 1000
         self.cells = Cells(self.points, codes[self.order]) if len(points) else None
         self.spacing, self.noise = spacing, noise
         self.low, self.high = (
@@ -166,18 +171,41 @@ class Surroundings:
             return np.empty(0, np.int64)
         return self.cells.near_cylinder(np.concatenate([point, direction, [1.0]]), low, high, inner, outer)
 
-    def free(self, indices: IndexArray, own: Sequence[int | None] = ()) -> MaskArray:
-        """Return which of some points belong to no pipe but those whose cylinders are given."""
+    def free(self, indices: IndexArray, own: Sequence[int] = ()) -> MaskArray:
+        """Return which of some points belong to nothing, or to one of the pipes whose labels are given."""
         labels = self.labels[indices]
         out = np.asarray(labels < 0, dtype=np.bool_)
-        for source in own:
-            if source is not None:
-                out |= labels == source
+        for label in own:
+            out |= labels == label
         return out
 
-    def claim(self, indices: IndexArray) -> None:
-        """Give points to a fitting: they are free no more."""
-        self.labels[indices] = CLAIMED
+    def new_label(self) -> int:
+        """Return a label that no pipe has."""
+        self._next += 1
+        return self._next
+
+    def label(self, indices: IndexArray, label: int = CLAIMED) -> None:
+        """Give points to a pipe, or to a fitting, whose they are for good; -1 makes them free."""
+        self.labels[indices] = label
+
+    def release(self, pipe: Pipe) -> None:
+        """Make the points of a pipe free that lie beyond its ends."""
+        margin = ON_SURFACE * pipe.spread
+        reach = pipe.radius + 4.0 * margin
+        for end in ENDS:
+            beyond = self.about(pipe.at(end), pipe.outward(end), margin, math.inf, reach)
+            self.label(beyond[self.labels[beyond] == pipe.label], -1)
+
+    def unclaim(self) -> None:
+        """Make the points of all fittings free."""
+        self.labels[self.labels == CLAIMED] = -1
+
+    def on(self, pipe: Pipe, extra: Sequence[int] = ()) -> IndexArray:
+        """Return the free points on a pipe, and its own."""
+        half, reach = 0.5 * pipe.length, ON_SURFACE * pipe.spread
+        inner = max(0.0, pipe.radius - reach)
+        found = self.about(pipe.middle, pipe.direction, -half, half, pipe.radius + reach, inner)
+        return found[self.free(found, (pipe.label, *extra))]
 
     def density(self, pipe: Pipe) -> float:
         """Return the points per area on a pipe's own surface, as if all of it were seen; 0 without points."""

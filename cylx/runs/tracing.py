@@ -14,10 +14,13 @@ from cylx.runs.bending import FittedBend, fit_meeting, meetings
 from cylx.runs.collars import Collar, collars_of
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
+from cylx.runs.pieces import refit
 from cylx.runs.pipes import ENDS, End, Pipe, Surroundings, tilted
 
 CROSSING = 0.5
 """Branches that face each other meet the main within so many of its radii of each other."""
+AGAIN = 0.2
+"""A pipe that lost so many radii of its length to fittings is fitted again without what it lost."""
 BETTER = 0.8
 """An axis moves with a fit that leaves it less than this share of its deviations."""
 
@@ -36,6 +39,8 @@ class Trace:
         Indices of the points of each fitting.
     taken : dict of (int, {'start', 'end'}) to int
         Fitting at each end that has one.
+    starts : list of Pipe
+        The pipes before any fitting was found.
     """
 
     pipes: list[Pipe]
@@ -43,6 +48,10 @@ class Trace:
     fittings: list[Fitting] = field(default_factory=list)
     points: list[IndexArray] = field(default_factory=list)
     taken: dict[tuple[int, End], int] = field(default_factory=dict)
+    starts: list[Pipe] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.starts = list(self.pipes)
 
     def add(self, fitting: Fitting, points: IndexArray) -> None:
         """Add a fitting; the ends it joins are taken."""
@@ -51,7 +60,7 @@ class Trace:
                 self.taken[pipe, end] = len(self.fittings)
         self.fittings.append(fitting)
         self.points.append(points)
-        self.near.claim(points)
+        self.near.label(points)
 
     def is_free(self, keys: Iterable[tuple[int, End]]) -> bool:
         """Return whether ends have no fitting yet."""
@@ -73,6 +82,18 @@ def add_bends(trace: Trace, near: Surroundings) -> int:
             add_bend(trace, one)
             count += 1
     return count
+
+
+def trim(trace: Trace, near: Surroundings) -> list[Pipe]:
+    """Return the pipes as they are between the fittings found so far: fitted to the points there, and no others."""
+    out = []
+    near.unclaim()
+    for k, pipe in enumerate(trace.pipes):
+        near.release(pipe)
+        lost = trace.starts[k].length - pipe.length if k < len(trace.starts) else 0.0
+        fitted = refit(pipe, near.points[near.on(pipe)]) if lost > AGAIN * pipe.radius else None
+        out.append(pipe if fitted is None else fitted)
+    return out
 
 
 def add_bend(trace: Trace, one: FittedBend) -> None:

@@ -1,0 +1,288 @@
+"""Pipes as they are between their fittings: cut where their points leave them, and apart where they are two."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from cylx.fits.likelihood import fit_mixture
+from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
+from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction
+from cylx.geometry.lines import common_perpendicular
+from cylx.runs.pipes import LEAST_SPREAD, ON_SURFACE, Pipe, Surroundings, turned
+
+SHELL = 0.3
+"""Points within so many radii of the surface, but not on it, say that the pipe is not there."""
+CUT = 0.5
+"""A pipe is fitted again if it lost so many radii of its length."""
+LEAST_POINTS, LEAST_LENGTH = 30, 1.5
+"""Of a piece: points, and length in its radii."""
+OWN_SHARE = 0.6
+"""Share of the points about a piece that must be on it."""
+UNSURE = 0.01
+"""A radius less certain than this, in itself, may be that of two pipes taken for one."""
+PARTS = 4
+DEPTH = 4
+"""Times that the rest of a pipe is looked at for more pieces."""
+OTHER_RADIUS, OTHER_AXIS = 0.03, 0.06
+"""Pieces that differ by less, in radii, beside their uncertainty, are one pipe."""
+PARALLEL = math.cos(math.radians(5.0))
+CROSSING = math.radians(25.0)
+THROUGH = 1.08
+BESIDE = 0.3
+
+
+def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
+    """Return the pipes with the ends that their points bear out, and apart those that are several.
+
+    Parameters
+    ----------
+    pipes : sequence of Pipe
+    near : Surroundings
+        Points that a pipe no longer has become free.
+    """
+    if near.cells is None:
+        return list(pipes)
+    out, more = [], []
+    for pipe in pipes:
+        pieces = _pieces(pipe, near, [one for one in pipes if one is not pipe], DEPTH)
+        first = max(pieces, key=lambda one: one.length) if pieces else pipe
+        for piece in pieces:
+            if piece is first:
+                out.append(replace(piece, label=pipe.label, source=pipe.source))
+            else:
+                more.append(replace(piece, label=near.new_label(), source=None))
+        if not pieces:
+            out.append(pipe)
+    for pipe in out:
+        near.release(pipe)
+    for pipe in more:
+        near.label(near.on(pipe), pipe.label)
+    return out + more
+
+
+def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) -> list[Pipe]:
+    """Return the piece of a pipe that its points bear out, and the pieces that what is left of it is."""
+    half = 0.5 * pipe.length
+    indices = near.about(pipe.middle, pipe.direction, -half, half, (1.0 + 2.0 * SHELL) * pipe.radius)
+    away = pipe.middle - np.array([one.middle for one in others]).reshape(-1, 3)
+    beside = [
+        one.label
+        for one, apart in zip(others, away, strict=True)
+        if abs(float(one.direction @ pipe.direction)) > PARALLEL
+        and float(np.linalg.norm(apart - (apart @ pipe.direction) * pipe.direction)) < pipe.radius
+    ]
+    own = near.free(indices, (pipe.label,))
+    foreign = np.isin(near.labels[indices], beside)
+    indices, foreign = indices[own | foreign], foreign[own | foreign]
+    points, own = near.points[indices], near.points[indices[~foreign]]
+    best = _sure(pipe, points, own, foreign, near.noise)
+    for _ in range(3):
+        low, high = stretch(best, points, foreign)
+        if high - low < LEAST_LENGTH * pipe.radius:
+            return []
+        lost = best.length - (high - low)
+        cut = best.with_ends(best.middle + low * best.direction, best.middle + high * best.direction)
+        if lost < CUT * cut.radius:
+            best = cut
+            break
+        best = refit(cut, own) or cut
+    return [best, *_rest(pipe, best, near, others, depth)]
+
+
+def _sure(pipe: Pipe, points: FloatArray, own: FloatArray, foreign: MaskArray, noise: float) -> Pipe:
+    """Return a pipe as that of its parts that is borne out best, if it may be several pipes taken for one."""
+    if math.sqrt(max(float(pipe.covariance[4, 4]), 0.0)) < UNSURE * pipe.radius:
+        return pipe
+    spread = max(LEAST_SPREAD * pipe.radius, min(noise, pipe.spread))
+    best, most = pipe, -math.inf
+    step = pipe.length / PARTS
+    for k in range(PARTS):
+        start = pipe.start + k * step * pipe.direction
+        part = replace(pipe.with_ends(start, start + step * pipe.direction), spread=spread)
+        fitted = refit(part, own, 0.3 * pipe.radius)
+        if fitted is None:
+            continue
+        whole = replace(fitted.with_ends(pipe.start, pipe.end), spread=spread)
+        low, high = stretch(whole, points, foreign)
+        if high - low > most:
+            best, most = whole, high - low
+    return best
+
+
+def stretch(pipe: Pipe, points: FloatArray, foreign: FloatArray | None = None) -> tuple[float, float]:
+    """Return between which heights from its middle a pipe is borne out by the points about it.
+
+    Points on its surface speak for it, those near it against it; the stretch has the largest sum.
+
+    Parameters
+    ----------
+    pipe : Pipe
+    points : ndarray of shape (N, 3)
+    foreign : ndarray of shape (N,), bool, optional
+        Points of other pipes: they speak against it, but where they are on its surface as well.
+    """
+    away = points - pipe.middle
+    heights = away @ pipe.direction
+    square = np.einsum("ij,ij->i", away, away) - heights**2
+    errors = np.abs(np.sqrt(np.maximum(square, 0.0)) - pipe.radius)
+    half, shell = 0.5 * pipe.length, max(SHELL * pipe.radius, 2.0 * ON_SURFACE * pipe.spread)
+    inside = (np.abs(heights) <= half) & (errors < shell)
+    # log-likelihood ratio of a point on the surface, against one anywhere in the shell
+    ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * pipe.spread))
+    scores = np.maximum(ratio - 0.5 * (errors / pipe.spread) ** 2, -ratio)
+    if foreign is not None:
+        scores[foreign] = np.minimum(scores[foreign], 0.0)
+    counted = np.flatnonzero(inside & (scores != 0.0))
+    if not len(counted):
+        return 0.0, 0.0
+    order = counted[np.argsort(heights[counted], kind="stable")]
+    total = np.concatenate([[0.0], np.cumsum(scores[order])])
+    lowest = np.minimum.accumulate(total)
+    last = int(np.argmax(total - lowest))
+    first = int(np.argmin(total[: last + 1]))
+    if last <= first:
+        return 0.0, 0.0
+    low, high = float(heights[order[first]]), float(heights[order[last - 1]])
+    # ends that lose nothing stay where they were
+    slack = 0.3 * pipe.radius
+    return (-half if low + half < slack else low), (half if half - high < slack else high)
+
+
+def refit(pipe: Pipe, points: FloatArray, width: float | None = None) -> Pipe | None:
+    """Fit a pipe to the points between its ends; None if that fails.
+
+    Parameters
+    ----------
+    pipe : Pipe
+    points : ndarray of shape (N, 3)
+    width : float, optional
+        How near to its surface points have a say at first.
+    """
+    half = 0.5 * pipe.length
+    width = width or max(4.0 * pipe.spread, 0.03 * pipe.radius)
+    floor = ON_SURFACE * pipe.spread
+    schedule = WeightSchedule(width, min(floor, width), 1.0, TUKEY * TUKEY_SPREAD, 1e-6)
+    fit = fit_cylinder(np.ascontiguousarray(points), pipe.model(), low=-half, high=half, schedule=schedule, steps=30)
+    if fit is None:
+        return None
+    model = fit[0]
+    deviation = max(fit[1] * TUKEY_SPREAD, 1e-9 * float(model[RADIUS]))
+    model[DIRECTION] = canonical_direction(model[DIRECTION])
+    likely = fit_mixture(points, model, low=-half, high=half, width=8.0 * deviation, deviation=deviation)
+    if likely is None:
+        return None
+    model = likely.model
+    middle, direction, radius = model[POINT], model[DIRECTION], float(model[RADIUS])
+    spread = max(deviation, LEAST_SPREAD * radius)
+    covariance = np.asarray(likely.covariance, dtype=np.float64)
+    if not (np.isfinite(covariance).all() and np.isfinite(model).all() and radius > 0):
+        return None
+    found = replace(
+        pipe,
+        start=middle - half * direction,
+        end=middle + half * direction,
+        radius=radius,
+        spread=min(spread, 2.0 * pipe.spread),
+        covariance=covariance,
+    )
+    return found.with_ends(pipe.start, pipe.end)
+
+
+def _rest(pipe: Pipe, best: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) -> list[Pipe]:
+    """Return the pieces of another pipe, of about the same axis, in what is left of a pipe at both ends."""
+    out: list[Pipe] = []
+    if depth == 0:
+        return out
+    for start, end in ((pipe.start, best.start), (best.end, pipe.end)):
+        if float((end - start) @ pipe.direction) < 2.0 * LEAST_LENGTH * pipe.radius:
+            continue
+        piece = _other(pipe.with_ends(*turned(start, end)), near)
+        if piece is not None and differs(piece, best):
+            out += _pieces(piece, near, others, depth - 1)
+    return out
+
+
+def _other(rest: Pipe, near: Surroundings) -> Pipe | None:
+    """Fit a pipe of another radius to the points about a part of an axis; None if there is none."""
+    half = 0.5 * rest.length
+    indices = near.about(rest.middle, rest.direction, -half, half, 1.7 * rest.radius)
+    indices = indices[near.free(indices, (rest.label,))]
+    if len(indices) < LEAST_POINTS:
+        return None
+    away = near.points[indices] - rest.middle
+    away -= (away @ rest.direction)[:, None] * rest.direction
+    first = replace(rest, radius=float(np.median(np.linalg.norm(away, axis=1))))
+    found = refit(first, near.points[indices], 0.35 * first.radius)
+    if found is None or abs(float(found.direction @ rest.direction)) < PARALLEL:
+        return None
+    return found if _is_borne_out(found, near.points[indices]) else None
+
+
+def _is_borne_out(pipe: Pipe, points: FloatArray) -> bool:
+    """Return whether most of the points about a pipe are on it."""
+    away = points - pipe.middle
+    heights = away @ pipe.direction
+    errors = np.abs(np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0)) - pipe.radius)
+    about = (np.abs(heights) <= 0.5 * pipe.length) & (errors < SHELL * pipe.radius)
+    own = about & (errors < ON_SURFACE * pipe.spread)
+    return bool(own.sum() >= max(LEAST_POINTS, OWN_SHARE * about.sum()))
+
+
+def differs(one: Pipe, two: Pipe) -> bool:
+    """Return whether two pieces of about one axis are different pipes."""
+    sd = math.sqrt(max(float(one.covariance[4, 4] + two.covariance[4, 4]), 0.0))
+    radius = min(one.radius, two.radius)
+    if abs(one.radius - two.radius) > OTHER_RADIUS * radius + ON_SURFACE * sd:
+        return True
+    place = 0.5 * (one.middle + two.middle)
+    feet = [pipe.middle + float((place - pipe.middle) @ pipe.direction) * pipe.direction for pipe in (one, two)]
+    uncertain = ON_SURFACE * math.hypot(one.axis_deviation(place), two.axis_deviation(place))
+    return float(np.linalg.norm(feet[0] - feet[1])) > OTHER_AXIS * radius + uncertain
+
+
+def split_crossings(pipes: list[Pipe], near: Surroundings) -> list[Pipe]:
+    """Return the pipes with those cut in two that go through another: they are two branches that face each other."""
+    out = list(pipes)
+    k = 0
+    while k < len(out):
+        main = _crossed(out, k)
+        if main is not None:
+            pipe, (center, sine) = out[k], main[1]
+            depth = main[0].radius / sine
+            along = float((center - pipe.middle) @ pipe.direction)
+            first = pipe.middle + (along - depth) * pipe.direction
+            second = pipe.middle + (along + depth) * pipe.direction
+            out[k] = pipe.with_ends(pipe.start, first)
+            other = replace(pipe.with_ends(second, pipe.end), label=near.new_label(), source=None)
+            near.release(out[k])
+            near.label(near.on(other), other.label)
+            out.append(other)
+        else:
+            k += 1
+    return out
+
+
+def _crossed(pipes: Sequence[Pipe], k: int) -> tuple[Pipe, tuple[FloatArray, float]] | None:
+    """Return the pipe that a pipe goes through, where, and the sine of the angle between them; None for none."""
+    pipe = pipes[k]
+    for j, main in enumerate(pipes):
+        if j == k or pipe.radius > THROUGH * main.radius:
+            continue
+        if pipe.radius > 0.95 * main.radius and (pipe.length, k) > (main.length, j):
+            continue
+        sine = float(np.linalg.norm(np.cross(pipe.direction, main.direction)))
+        if sine < math.sin(CROSSING):
+            continue
+        feet = common_perpendicular(pipe.middle, pipe.direction, main.middle, main.direction)[:2]
+        if float(np.linalg.norm(feet[0] - feet[1])) > BESIDE * main.radius:
+            continue
+        inside = abs(float((feet[0] - pipe.middle) @ pipe.direction)) < 0.5 * pipe.length - 2.0 * main.radius / sine
+        on = abs(float((feet[1] - main.middle) @ main.direction)) < 0.5 * main.length - 0.3 * pipe.radius
+        if inside and on:
+            return main, (feet[0], sine)
+    return None
