@@ -8,10 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
-from cylx.geometry.numerics import cross
 
 LEAST_TURN = math.radians(3.0)
 """Directions that differ by less are those of one straight pipe."""
+
+
+def _cross(a: FloatArray, b: FloatArray) -> tuple[float, float, float]:
+    """Return the cross product of two vectors as plain numbers: arrays of three cost ten times as much."""
+    (ax, ay, az), (bx, by, bz) = a.tolist(), b.tolist()
+    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +41,8 @@ class Bend:
     @property
     def angle(self) -> float:
         """Change of direction, radians."""
-        return float(math.atan2(np.linalg.norm(cross(self.first, self.second)), float(self.first @ self.second)))
+        across = _cross(self.first, self.second)
+        return math.atan2(math.sqrt(sum(part * part for part in across)), float(self.first @ self.second))
 
     @property
     def tangent(self) -> float:
@@ -51,13 +57,13 @@ class Bend:
     @property
     def normal(self) -> FloatArray:
         """Unit normal of its plane; the direction turns about it, right-handed."""
-        across = cross(self.first, self.second)
-        return np.asarray(across / np.linalg.norm(across), dtype=np.float64)
+        across = np.array(_cross(self.first, self.second))
+        return np.asarray(across / math.sqrt(float(across @ across)), dtype=np.float64)
 
     @property
     def inward(self) -> FloatArray:
         """Unit direction from the beginning of the arc to its centre."""
-        return cross(self.normal, self.first)
+        return np.array(_cross(self.normal, self.first))
 
     @property
     def start(self) -> FloatArray:
@@ -87,22 +93,25 @@ class Bend:
             0 at the beginning of the arc, negative before it.
         distances : ndarray of shape (N,)
         """
-        angle, radius = self.angle, self.bend_radius
-        away = points - (self.start + radius * self.inward)
-        x, y, z = away @ self.first, -(away @ self.inward), away @ self.normal
+        angle, radius, first, second = self.angle, self.bend_radius, self.first, self.second
+        normal = np.array(_cross(first, second))
+        normal /= math.sqrt(float(normal @ normal))
+        inward = np.array(_cross(normal, first))
+        tangent = radius * math.tan(0.5 * angle)
+        start, end = self.meeting - tangent * first, self.meeting + tangent * second
+        x, y, z = np.column_stack([first, -inward, normal]).T @ (points - (start + radius * inward)).T
         out = np.hypot(x, y)
         # the middle of the arc is at zero, so that what lies behind the centre is cut in half
         turn = np.arctan2(x, y) - 0.5 * angle
         turn = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
         turn = np.where(turn < -math.pi, turn + 2.0 * math.pi, turn)
-        beyond = points - self.end
-        further = beyond @ self.second
-        across = beyond - further[:, None] * self.second
+        beyond = points - end
+        further = beyond @ second
         # the end is where the second straight begins, whatever the angle says of a point
         before = turn < -0.5 * angle
         after = turn > 0.5 * angle
         square = np.where(before, (y - radius) ** 2, (out - radius) ** 2) + z**2
-        square = np.where(after, np.einsum("ij,ij->i", across, across), square)
+        square = np.where(after, np.maximum(np.einsum("ij,ij->i", beyond, beyond) - further**2, 0.0), square)
         along = np.where(before, x, radius * (turn + 0.5 * angle))
-        along = np.where(after, self.length + further, along)
+        along = np.where(after, radius * angle + further, along)
         return along, np.sqrt(square)

@@ -23,9 +23,11 @@ SKEW = 0.25
 """Axes meet if they pass each other within so many radii, beside their uncertainty."""
 OVERSHOOT = 1.5
 """Straights may have been found so many radii too long: into the bend."""
-MOST_POINTS = 4000
+MOST_POINTS = 1500
 TRIED = 28
 """Bend radii that are tried before the fit."""
+CLOSE = 10.0
+"""The fit ends at steps shorter than so many of the small ones that derivatives are taken by."""
 BINS = 8
 """Pieces of the arc, at most, that are asked for points."""
 LEAST_INLIERS = 10
@@ -172,7 +174,9 @@ def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> Fitt
     fine = np.linspace(tried[max(best - 1, 0)], tried[min(best + 1, TRIED)], 17)
     costs = _costs(meeting.bend, fine, points, radius, spread)
     bend = replace(meeting.bend, bend_radius=float(fine[costs.argmin()]))
-    solved = refined(bend, one, two, radius, points, spread)
+    _, distances = bend.coordinates(points)
+    about = points[np.abs(distances - radius) < max(0.3 * radius, 2.0 * ON_SURFACE * spread)]
+    solved = refined(bend, one, two, radius, about, spread)
     return judged(meeting.pipes, meeting.ends, solved, indices, near, spread)
 
 
@@ -222,12 +226,23 @@ def bend_of(
     other, onward = tilted(two, change[4:8])
     first = direction if ends[0] == "end" else -direction
     second = onward if ends[1] == "start" else -onward
-    feet = common_perpendicular(middle, first, other, second)[:2]
-    return Bend(0.5 * (feet[0] + feet[1]), first, second, bend_radius), feet[0] - feet[1]
+    away = other - middle
+    cosine, along, onto = float(direction @ onward), float(away @ direction), float(away @ onward)
+    sine = 1.0 - cosine * cosine
+    foot = middle + (along - cosine * onto) / sine * direction
+    skew = foot - (other + (cosine * along - onto) / sine * onward)
+    return Bend(foot - 0.5 * skew, first, second, bend_radius), skew
 
 
 def refined(
-    bend: Bend, one: Pipe, two: Pipe, radius: float, points: FloatArray, spread: float, steps: int = 8
+    bend: Bend,
+    one: Pipe,
+    two: Pipe,
+    radius: float,
+    points: FloatArray,
+    spread: float,
+    steps: int = 8,
+    beyond: float = 0.0,
 ) -> Solved:
     """Fit bend radius, tube radius and both axes to the points of the bend, with what is known of the pipes as priors.
 
@@ -244,6 +259,8 @@ def refined(
         Standard deviation of points about a surface.
     steps : int
         Gauss-Newton steps.
+    beyond : float
+        Up to how far behind the arc points of the second pipe have a full say: that of one that was not fitted yet.
     """
     ends: tuple[End, End] = (
         "end" if float(bend.first @ one.direction) > 0 else "start",
@@ -271,7 +288,7 @@ def refined(
         along, errors, skew = residuals(state)
         length = max(state[9], 0.0) * bend.angle
         # points of the straights are in their priors already
-        beside = np.maximum(np.maximum(-along, along - length), 0.0)
+        beside = np.maximum(np.maximum(-along, along - length - beyond), 0.0)
         weights = np.maximum(1.0 - (errors / (ON_SURFACE * 1.5 * spread)) ** 2, 0.0) ** 2
         weights *= np.where(beside > 2.0 * radius, 0.0, np.where(beside > 0.0, 0.25, 1.0)) / spread**2
         jacobian, bending = np.empty((len(points), 10)), np.empty((3, 10))
@@ -288,7 +305,7 @@ def refined(
         step = covariance @ gradient
         state = state - step
         state[9] = max(state[9], 0.0)
-        if float(np.abs(step / small).max()) < 1.0:
+        if float(np.abs(step / small).max()) < CLOSE:
             break
     shape, _ = bend_of(one, two, ends, state, float(state[9]))
     change = np.asarray(state[:8] - base[:8], dtype=np.float64)

@@ -16,7 +16,7 @@ LONGEST_REDUCER = 8.0
 """Distance of the ends, in the larger radius."""
 LONGEST_GAP = 24.0
 """Gaps within one size that are longer, in radii, are not bridged."""
-OVERLAP = 2.5
+OVERLAP = 5.0
 """Ends may have been found so many radii too long: into the reducer."""
 SAME_SIZE = 0.05
 """Radii that differ by less are those of one size, beside their uncertainty."""

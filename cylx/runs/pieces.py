@@ -13,7 +13,8 @@ from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction
 from cylx.geometry.lines import common_perpendicular
-from cylx.runs.pipes import LEAST_SPREAD, ON_SURFACE, Pipe, Surroundings, turned
+from cylx.runs.facing import facing_ends
+from cylx.runs.pipes import LEAST_SPREAD, ON_SURFACE, End, Pipe, Surroundings, turned
 
 SHELL = 0.3
 """Points within so many radii of the surface, but not on it, say that the pipe is not there."""
@@ -25,11 +26,15 @@ OWN_SHARE = 0.6
 """Share of the points about a piece that must be on it."""
 UNSURE = 0.01
 """A radius less certain than this, in itself, may be that of two pipes taken for one."""
+HOLE = 12.0
+"""Log-likelihood ratio against a pipe, within it, from which it may be two pipes."""
 PARTS = 4
 DEPTH = 4
 """Times that the rest of a pipe is looked at for more pieces."""
 OTHER_RADIUS, OTHER_AXIS = 0.03, 0.06
 """Pieces that differ by less, in radii, beside their uncertainty, are one pipe."""
+LONGEST_HIDDEN = 20.0
+"""Pieces of one pipe are joined across gaps up to so many radii."""
 PARALLEL = math.cos(math.radians(5.0))
 CROSSING = math.radians(25.0)
 THROUGH = 1.08
@@ -62,7 +67,31 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
         near.release(pipe)
     for pipe in more:
         near.label(near.on(pipe), pipe.label)
-    return out + more
+    return _rejoined(out + more, near) if more else out
+
+
+def _rejoined(pipes: list[Pipe], near: Surroundings) -> list[Pipe]:
+    """Return the pipes with new pieces joined to those that they continue, which are hidden in between."""
+    out = list(pipes)
+    changed = True
+    while changed:
+        changed = False
+        for facing in facing_ends(out, set()):
+            first, second = (out[k] for k in facing.pipes)
+            if not facing.same_size or (first.source is not None and second.source is not None):
+                continue
+            if differs(first, second) or facing.gap > LONGEST_HIDDEN * first.radius:
+                continue
+            kept, lost = (first, second) if first.source is not None else (second, first)
+            far = max((lost.start, lost.end), key=lambda place: float(np.linalg.norm(place - kept.middle)))
+            end: End = "end" if float((far - kept.middle) @ kept.direction) > 0 else "start"
+            longer = kept.with_end(end, far)
+            near.label(near.on(lost, (lost.label,)), kept.label)
+            out[out.index(kept)] = refit(longer, near.points[near.on(longer)]) or longer
+            out.remove(lost)
+            changed = True
+            break
+    return out
 
 
 def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) -> list[Pipe]:
@@ -82,7 +111,7 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
     points, own = near.points[indices], near.points[indices[~foreign]]
     best = _sure(pipe, points, own, foreign, near.noise)
     for _ in range(3):
-        low, high = stretch(best, points, foreign)
+        low, high, _ = stretch(best, points, foreign)
         if high - low < LEAST_LENGTH * pipe.radius:
             return []
         lost = best.length - (high - low)
@@ -91,6 +120,12 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
             best = cut
             break
         best = refit(cut, own) or cut
+    parted = _parted(best, points, own, foreign) if depth > 0 else None
+    if parted is not None:
+        first, second = parted
+        sides = [piece for side in (first, second) for piece in _pieces(side, near, others, depth - 1)]
+        between = _other(pipe.with_ends(first.end, second.start), near)
+        return sides if between is None else [*sides, *_pieces(between, near, others, depth - 1)]
     return [best, *_rest(pipe, best, near, others, depth)]
 
 
@@ -108,14 +143,61 @@ def _sure(pipe: Pipe, points: FloatArray, own: FloatArray, foreign: MaskArray, n
         if fitted is None:
             continue
         whole = replace(fitted.with_ends(pipe.start, pipe.end), spread=spread)
-        low, high = stretch(whole, points, foreign)
-        if high - low > most:
-            best, most = whole, high - low
+        gain = stretch(whole, points, foreign)[2]
+        if gain > most:
+            best, most = whole, gain
     return best
 
 
-def stretch(pipe: Pipe, points: FloatArray, foreign: FloatArray | None = None) -> tuple[float, float]:
-    """Return between which heights from its middle a pipe is borne out by the points about it.
+def gains(pipe: Pipe, points: FloatArray, foreign: MaskArray | None = None) -> tuple[FloatArray, FloatArray]:
+    """Return heights of points from the middle of a pipe, and the log-likelihood ratio of each for it.
+
+    That is of a point on the surface against one anywhere in the shell about it; 0 for points further away.
+    """
+    away = points - pipe.middle
+    heights = away @ pipe.direction
+    square = np.einsum("ij,ij->i", away, away) - heights**2
+    errors = np.abs(np.sqrt(np.maximum(square, 0.0)) - pipe.radius)
+    shell = max(SHELL * pipe.radius, 2.0 * ON_SURFACE * pipe.spread)
+    ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * pipe.spread))
+    scores = np.where(errors < shell, np.maximum(ratio - 0.5 * (errors / pipe.spread) ** 2, -ratio), 0.0)
+    if foreign is not None:
+        scores[foreign] = np.minimum(scores[foreign], 0.0)
+    return heights, scores
+
+
+def _hole(pipe: Pipe, points: FloatArray, foreign: MaskArray) -> tuple[float, float] | None:
+    """Return between which heights the points speak most against a pipe, if they do so clearly; None if not."""
+    heights, scores = gains(pipe, points, foreign)
+    order = np.argsort(heights, kind="stable")
+    heights, total = heights[order], np.concatenate([[0.0], np.cumsum(scores[order])])
+    highest = np.maximum.accumulate(total)
+    last = int(np.argmin(total - highest))
+    first = int(np.argmax(total[: last + 1]))
+    if last <= first or total[last] - total[first] > -HOLE:
+        return None
+    return float(heights[first]), float(heights[last - 1])
+
+
+def _parted(pipe: Pipe, points: FloatArray, own: FloatArray, foreign: MaskArray) -> tuple[Pipe, Pipe] | None:
+    """Return the two pipes that a pipe is, if they are different on both sides of a hole in it; None if not."""
+    hole = _hole(pipe, points, foreign)
+    if hole is None:
+        return None
+    low, high = (pipe.middle + height * pipe.direction for height in hole)
+    sides = []
+    for start, end in ((pipe.start, low), (high, pipe.end)):
+        if float((end - start) @ pipe.direction) < 2.0 * LEAST_LENGTH * pipe.radius:
+            return None
+        fitted = refit(pipe.with_ends(start, end), own)
+        if fitted is None:
+            return None
+        sides.append(fitted)
+    return (sides[0], sides[1]) if differs(sides[0], sides[1]) else None
+
+
+def stretch(pipe: Pipe, points: FloatArray, foreign: MaskArray | None = None) -> tuple[float, float, float]:
+    """Return between which heights from its middle a pipe is borne out by the points about it, and by how much.
 
     Points on its surface speak for it, those near it against it; the stretch has the largest sum.
 
@@ -126,31 +208,24 @@ def stretch(pipe: Pipe, points: FloatArray, foreign: FloatArray | None = None) -
     foreign : ndarray of shape (N,), bool, optional
         Points of other pipes: they speak against it, but where they are on its surface as well.
     """
-    away = points - pipe.middle
-    heights = away @ pipe.direction
-    square = np.einsum("ij,ij->i", away, away) - heights**2
-    errors = np.abs(np.sqrt(np.maximum(square, 0.0)) - pipe.radius)
-    half, shell = 0.5 * pipe.length, max(SHELL * pipe.radius, 2.0 * ON_SURFACE * pipe.spread)
-    inside = (np.abs(heights) <= half) & (errors < shell)
-    # log-likelihood ratio of a point on the surface, against one anywhere in the shell
-    ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * pipe.spread))
-    scores = np.maximum(ratio - 0.5 * (errors / pipe.spread) ** 2, -ratio)
-    if foreign is not None:
-        scores[foreign] = np.minimum(scores[foreign], 0.0)
+    half = 0.5 * pipe.length
+    heights, scores = gains(pipe, points, foreign)
+    inside = np.abs(heights) <= half
     counted = np.flatnonzero(inside & (scores != 0.0))
     if not len(counted):
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     order = counted[np.argsort(heights[counted], kind="stable")]
     total = np.concatenate([[0.0], np.cumsum(scores[order])])
     lowest = np.minimum.accumulate(total)
     last = int(np.argmax(total - lowest))
     first = int(np.argmin(total[: last + 1]))
     if last <= first:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     low, high = float(heights[order[first]]), float(heights[order[last - 1]])
     # ends that lose nothing stay where they were
     slack = 0.3 * pipe.radius
-    return (-half if low + half < slack else low), (half if half - high < slack else high)
+    gain = float(total[last] - total[first])
+    return (-half if low + half < slack else low), (half if half - high < slack else high), gain
 
 
 def refit(pipe: Pipe, points: FloatArray, width: float | None = None) -> Pipe | None:

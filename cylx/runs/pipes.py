@@ -228,4 +228,4 @@ def tilted(pipe: Pipe, change: FloatArray) -> tuple[FloatArray, FloatArray]:
     first, second = axis_basis(pipe.direction)
     direction = pipe.direction + change[2] * first + change[3] * second
     middle = pipe.middle + change[0] * first + change[1] * second
-    return middle, direction / np.linalg.norm(direction)
+    return middle, direction / math.sqrt(float(direction @ direction))

@@ -39,6 +39,8 @@ class Trace:
         Indices of the points of each fitting.
     taken : dict of (int, {'start', 'end'}) to int
         Fitting at each end that has one.
+    followed : set of (int, {'start', 'end'})
+        Ends that were followed onward.
     starts : list of Pipe
         The pipes before any fitting was found.
     """
@@ -48,6 +50,7 @@ class Trace:
     fittings: list[Fitting] = field(default_factory=list)
     points: list[IndexArray] = field(default_factory=list)
     taken: dict[tuple[int, End], int] = field(default_factory=dict)
+    followed: set[tuple[int, End]] = field(default_factory=set)
     starts: list[Pipe] = field(init=False)
 
     def __post_init__(self) -> None:
