@@ -307,3 +307,26 @@ class Piping:
     fittings: tuple[Fitting, ...]
     runs: tuple[PipeRun, ...]
     labels: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+
+    def run_ids(self, cylinders: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Return the run of each point.
+
+        Parameters
+        ----------
+        cylinders : ndarray of shape (N,), int32
+            Cylinder of each point, -1 for none.
+
+        Returns
+        -------
+        ndarray of shape (N,), int32
+            -1 for points of no cylinder and no fitting.
+        """
+        most = max((cylinder for run in self.runs for cylinder in run.cylinders), default=-1)
+        of_cylinder, of_fitting = np.full(most + 2, -1, np.int32), np.full(len(self.fittings) + 1, -1, np.int32)
+        for number, run in enumerate(self.runs):
+            of_cylinder[list(run.cylinders)] = number
+            of_fitting[list(run.fittings)] = number
+        out = of_cylinder[cylinders]
+        if len(self.labels):
+            out = np.where(self.labels >= 0, of_fitting[self.labels], out)
+        return np.asarray(out, dtype=np.int32)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import degrees, isfinite
+from math import degrees, isfinite, radians
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
@@ -143,6 +143,27 @@ class ResultCylinder(Measured, Numbered):  # the keys of the last base class com
         content = self.model_dump(mode="json")
         drop_missing([content, content["catalogue"] or {}])
         return content
+
+    def to_fit(self) -> CylinderFit:
+        """Return the cylinder as it was before it was written."""
+        from cylx.geometry.cylinder import Cylinder  # noqa: PLC0415  brings numba
+        from cylx.records import CylinderFit, NominalRadius  # noqa: PLC0415  bring numba
+
+        match = self.catalogue
+        return CylinderFit(
+            Cylinder(np.array(self.axis_point), np.array(self.axis_direction), self.radius, self.height),
+            self.inliers,
+            self.rmse,
+            radians(self.coverage_deg),
+            self.support,
+            self.payoff,
+            self.confidence,
+            dict(self.evidence or {}),
+            None if self.uncertainty is None else np.array(self.uncertainty.covariance),
+            None if match is None else NominalRadius(**match.model_dump()),
+            self.form,
+            self.side,
+        )
 
 
 class ResultBlend(ResultCylinder):

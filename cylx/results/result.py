@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -25,7 +25,7 @@ from cylx.version import __version__
 from cylx.wording import counted
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, Scene, StageReport, TiledExtraction
+    from cylx.records import CylinderFit, Extraction, Scene, StageReport, TiledExtraction
     from cylx.records.fittings import Piping
 
 
@@ -134,12 +134,18 @@ class Result(Part):
             scene=SceneScale.of(extraction.scene),
             tiles=None if tiling is None else Tiles.model_validate(asdict(tiling)),
             stages=[_stage(report) for report in extraction.stages],
-            cylinders=[ResultCylinder.of(i, fit) for i, fit in enumerate(extraction.cylinders)],
             blends=None if blends is None else [ResultBlend.of(i, fit) for i, fit in enumerate(blends)],
-            fittings=None if piping is None else [fitting_of(i, one) for i, one in enumerate(piping.fittings)],
-            runs=None if piping is None else [ResultRun.of(i, run) for i, run in enumerate(piping.runs)],
             warnings=list(extraction.warnings),
+            **cls.lists_of(extraction.cylinders, piping),
         )
+
+    @staticmethod
+    def lists_of(cylinders: Sequence[CylinderFit], piping: Piping | None) -> dict[str, Any]:
+        """Return the keys of cylinders, and of their fittings and runs if these were looked for."""
+        fittings = None if piping is None else [fitting_of(i, one) for i, one in enumerate(piping.fittings)]
+        runs = None if piping is None else [ResultRun.of(i, run) for i, run in enumerate(piping.runs)]
+        listed = [ResultCylinder.of(i, fit) for i, fit in enumerate(cylinders)]
+        return {"cylinders": listed, "fittings": fittings, "runs": runs}
 
     @classmethod
     def parse(cls, mapping: Mapping[str, Any], place: str) -> Result:

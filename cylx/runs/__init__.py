@@ -1,4 +1,4 @@
-"""Runs: the cylinders of a cloud joined by their fittings, which are proposed by their axes and fitted to its points."""
+"""Runs: cylinders joined by their fittings, which are proposed by the axes and fitted to the points."""
 
 from __future__ import annotations
 
@@ -11,9 +11,11 @@ from cylx.fits.nominal_radius import Catalogue
 from cylx.geometry.arrays import FloatArray
 from cylx.records import CylinderFit
 from cylx.runs.answer import Traced, answer_of
+from cylx.runs.crossings import split_crossings
 from cylx.runs.graph import find_runs
 from cylx.runs.onward import follow_ends
-from cylx.runs.pieces import settled, split_crossings
+from cylx.runs.parts import drop_parts
+from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.tracing import (
     Trace,
@@ -23,7 +25,6 @@ from cylx.runs.tracing import (
     add_gaps,
     add_junctions,
     add_reducers,
-    drop_parts,
     trim,
 )
 

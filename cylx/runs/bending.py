@@ -11,7 +11,8 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.lines import common_perpendicular
 from cylx.runs.bend import LEAST_TURN, Bend
-from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, tilted
+from cylx.runs.bend_fit import Solved, refined
+from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings
 
 REACH = 30.0
 """Ends further apart than this many radii are not joined by a bend."""
@@ -26,8 +27,6 @@ OVERSHOOT = 1.5
 MOST_POINTS = 1500
 TRIED = 28
 """Bend radii that are tried before the fit."""
-CLOSE = 10.0
-"""The fit ends at steps shorter than so many of the small ones that derivatives are taken by."""
 BINS = 8
 """Pieces of the arc, at most, that are asked for points."""
 LEAST_INLIERS = 10
@@ -160,6 +159,8 @@ def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> Fitt
     slope = math.tan(0.5 * meeting.bend.angle)
     room = min(meeting.ahead[0] + 0.9 * one.length, meeting.ahead[1] + 0.9 * two.length)
     most = min(room / slope, WIDEST_BEND * radius)
+    if near.cells is None:
+        return _by_axes(meeting, pipes, slope)
     if most <= 0:
         return None
     reach = most * slope + 2.0 * radius
@@ -178,6 +179,17 @@ def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> Fitt
     about = points[np.abs(distances - radius) < max(0.3 * radius, 2.0 * ON_SURFACE * spread)]
     solved = refined(bend, one, two, radius, about, spread)
     return judged(meeting.pipes, meeting.ends, solved, indices, near, spread)
+
+
+def _by_axes(meeting: Meeting, pipes: list[Pipe], slope: float) -> FittedBend | None:
+    """Return the bend that begins at the nearer of two ends: all that is known without points."""
+    radius = 0.5 * sum(pipes[i].radius for i in meeting.pipes)
+    bend_radius = max(min(meeting.ahead), 0.0) / slope
+    if bend_radius > WIDEST_BEND * radius:
+        return None
+    bend, none = replace(meeting.bend, bend_radius=bend_radius), np.empty(0, np.int64)
+    known = np.stack([pipes[i].covariance[:4, :4] for i in meeting.pipes])
+    return FittedBend(meeting.pipes, meeting.ends, bend, radius, none, 0.0, 0.0, 0.0, 0.0, {}, np.zeros((2, 4)), known)
 
 
 def _zone(bend: Bend, reach: float, most: float, radius: float, own: tuple[int, int], near: Surroundings) -> IndexArray:
@@ -206,110 +218,6 @@ def _costs(bend: Bend, radii: FloatArray, points: FloatArray, radius: float, spr
         squares[k] = np.minimum(((distances - radius) / width) ** 2, 1.0)
     # a larger bend is shorter, so that costs count all points that are on any of them
     return np.asarray(squares[:, (squares < 1.0).any(axis=0)].sum(axis=1))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Solved:
-    """A bend after its fit: with the radius of its tube, what moved the pipes, and the covariance of all of it."""
-
-    bend: Bend
-    radius: float
-    change: FloatArray
-    covariance: FloatArray
-
-
-def bend_of(
-    one: Pipe, two: Pipe, ends: tuple[End, End], change: FloatArray, bend_radius: float
-) -> tuple[Bend, FloatArray]:
-    """Return the bend between two axes after small changes, and by how much they pass each other."""
-    middle, direction = tilted(one, change[:4])
-    other, onward = tilted(two, change[4:8])
-    first = direction if ends[0] == "end" else -direction
-    second = onward if ends[1] == "start" else -onward
-    away = other - middle
-    cosine, along, onto = float(direction @ onward), float(away @ direction), float(away @ onward)
-    sine = 1.0 - cosine * cosine
-    foot = middle + (along - cosine * onto) / sine * direction
-    skew = foot - (other + (cosine * along - onto) / sine * onward)
-    return Bend(foot - 0.5 * skew, first, second, bend_radius), skew
-
-
-def refined(
-    bend: Bend,
-    one: Pipe,
-    two: Pipe,
-    radius: float,
-    points: FloatArray,
-    spread: float,
-    steps: int = 8,
-    beyond: float = 0.0,
-) -> Solved:
-    """Fit bend radius, tube radius and both axes to the points of the bend, with what is known of the pipes as priors.
-
-    Parameters
-    ----------
-    bend : Bend
-        Start of the fit.
-    one, two : Pipe
-        The pipes; their ends are told by the directions of the bend.
-    radius : float
-        Start of the radius of the tube.
-    points : ndarray of shape (N, 3)
-    spread : float
-        Standard deviation of points about a surface.
-    steps : int
-        Gauss-Newton steps.
-    beyond : float
-        Up to how far behind the arc points of the second pipe have a full say: that of one that was not fitted yet.
-    """
-    ends: tuple[End, End] = (
-        "end" if float(bend.first @ one.direction) > 0 else "start",
-        "start" if float(bend.second @ two.direction) > 0 else "end",
-    )
-    information = np.zeros((10, 10))
-    for place, pipe in ((0, one), (4, two)):
-        known = pipe.covariance[:4, :4] + np.diag([*[(0.002 * radius) ** 2] * 2, *[1e-6] * 2])
-        information[place : place + 4, place : place + 4] = np.linalg.inv(known)
-    tube = 1.0 / max(one.covariance[4, 4], 1e-300) + 1.0 / max(two.covariance[4, 4], 1e-300)
-    information[8, 8] = 1.0 / (1.0 / tube + (0.01 * radius) ** 2)
-    base = np.zeros(10)
-    base[8], base[9] = radius, bend.bend_radius
-    state = base.copy()
-    small = np.array([*[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2])
-    skewed = 0.02 * radius
-
-    def residuals(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        shape, skew = bend_of(one, two, ends, values, max(float(values[9]), 0.0))
-        along, distances = shape.coordinates(points)
-        return along, distances - values[8], skew
-
-    covariance = np.linalg.inv(information + np.diag([*[0.0] * 9, 1e-12 / radius**2]))
-    for _ in range(steps):
-        along, errors, skew = residuals(state)
-        length = max(state[9], 0.0) * bend.angle
-        # points of the straights are in their priors already
-        beside = np.maximum(np.maximum(-along, along - length - beyond), 0.0)
-        weights = np.maximum(1.0 - (errors / (ON_SURFACE * 1.5 * spread)) ** 2, 0.0) ** 2
-        weights *= np.where(beside > 2.0 * radius, 0.0, np.where(beside > 0.0, 0.25, 1.0)) / spread**2
-        jacobian, bending = np.empty((len(points), 10)), np.empty((3, 10))
-        for k in range(10):
-            moved = state.copy()
-            moved[k] += small[k]
-            _, shifted, skewing = residuals(moved)
-            jacobian[:, k], bending[:, k] = (shifted - errors) / small[k], (skewing - skew) / small[k]
-        normal = information + (jacobian * weights[:, None]).T @ jacobian + bending.T @ bending / skewed**2
-        normal[9, 9] += 1e-9 / radius**2
-        gradient = information @ (state - base) + jacobian.T @ (weights * errors) + bending.T @ skew / skewed**2
-        gradient[9] -= information[9, 9] * (state[9] - base[9])
-        covariance = np.linalg.inv(normal)
-        step = covariance @ gradient
-        state = state - step
-        state[9] = max(state[9], 0.0)
-        if float(np.abs(step / small).max()) < CLOSE:
-            break
-    shape, _ = bend_of(one, two, ends, state, float(state[9]))
-    change = np.asarray(state[:8] - base[:8], dtype=np.float64)
-    return Solved(shape, float(state[8]), change, np.asarray(covariance, dtype=np.float64))
 
 
 def judged(

@@ -128,6 +128,9 @@ def fit_reducer(facing: Facing, pipes: list[Pipe], near: Surroundings) -> Fitted
     one, two = (pipes[i] for i in facing.pipes)
     first, axis = one.at(facing.ends[0]), one.outward(facing.ends[0])
     large = max(one.radius, two.radius)
+    if near.cells is None:
+        none = np.empty(0, np.int64)
+        return FittedCone(facing, first, two.at(facing.ends[1]), none, 0.0, 0.0, 0.0, {}) if facing.gap > 0 else None
     spread = max(one.spread, two.spread)
     before, after = min(OVERLAP * large, 0.8 * one.length), min(OVERLAP * large, 0.8 * two.length)
     indices = near.about(first, axis, -before - large, facing.gap + after + large, 1.4 * large + facing.offset)

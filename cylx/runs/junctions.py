@@ -101,8 +101,8 @@ def _branching(pipes: list[Pipe], i: int, end: End, j: int) -> Branching | None:
 
 
 def _arrives(found: Branching, pipes: list[Pipe], near: Surroundings) -> bool:
-    """Return whether the branch has points up to the surface of the main, and the main about it."""
-    branch, main = pipes[found.branch], pipes[found.main]
+    """Return whether the branch has points up to the surface of the main."""
+    branch = pipes[found.branch]
     if near.cells is None or found.gap < 0.5 * branch.radius + 2.0 * near.spacing:
         return True
     reach = ON_SURFACE * branch.spread

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import Bend
-from cylx.runs.bending import FittedBend, judged, refined
+from cylx.runs.bend_fit import refined
+from cylx.runs.bending import FittedBend, judged
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
 from cylx.runs.tracing import Trace, add_bend
 
@@ -157,7 +158,7 @@ def _best_start(
                     best = (float(total[most]), turn, before, size, (most + 1) * STEP * radius / size)
     if best is None or best[0] * weight < LEAST_SCORE:
         return None
-    score, turn, before, size, angle = best
+    _, turn, before, size, angle = best
     inward = math.cos(turn) * first + math.sin(turn) * second
     start = place + before * radius * axis
     tried = []

@@ -12,7 +12,6 @@ from cylx.fits.likelihood import fit_mixture
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction
-from cylx.geometry.lines import common_perpendicular
 from cylx.runs.facing import facing_ends
 from cylx.runs.pipes import LEAST_SPREAD, ON_SURFACE, End, Pipe, Surroundings, turned
 
@@ -36,9 +35,6 @@ OTHER_RADIUS, OTHER_AXIS = 0.03, 0.06
 LONGEST_HIDDEN = 20.0
 """Pieces of one pipe are joined across gaps up to so many radii."""
 PARALLEL = math.cos(math.radians(5.0))
-CROSSING = math.radians(25.0)
-THROUGH = 1.08
-BESIDE = 0.3
 
 
 def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
@@ -105,9 +101,9 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
         if abs(float(one.direction @ pipe.direction)) > PARALLEL
         and float(np.linalg.norm(apart - (apart @ pipe.direction) * pipe.direction)) < pipe.radius
     ]
-    own = near.free(indices, (pipe.label,))
-    foreign = np.isin(near.labels[indices], beside)
-    indices, foreign = indices[own | foreign], foreign[own | foreign]
+    of_others = np.isin(near.labels[indices], beside)
+    used = near.free(indices, (pipe.label,)) | of_others
+    indices, foreign = indices[used], of_others[used]
     points, own = near.points[indices], near.points[indices[~foreign]]
     best = _sure(pipe, points, own, foreign, near.noise)
     for _ in range(3):
@@ -318,46 +314,3 @@ def differs(one: Pipe, two: Pipe) -> bool:
     feet = [pipe.middle + float((place - pipe.middle) @ pipe.direction) * pipe.direction for pipe in (one, two)]
     uncertain = ON_SURFACE * math.hypot(one.axis_deviation(place), two.axis_deviation(place))
     return float(np.linalg.norm(feet[0] - feet[1])) > OTHER_AXIS * radius + uncertain
-
-
-def split_crossings(pipes: list[Pipe], near: Surroundings) -> list[Pipe]:
-    """Return the pipes with those cut in two that go through another: they are two branches that face each other."""
-    out = list(pipes)
-    k = 0
-    while k < len(out):
-        main = _crossed(out, k)
-        if main is not None:
-            pipe, (center, sine) = out[k], main[1]
-            depth = main[0].radius / sine
-            along = float((center - pipe.middle) @ pipe.direction)
-            first = pipe.middle + (along - depth) * pipe.direction
-            second = pipe.middle + (along + depth) * pipe.direction
-            out[k] = pipe.with_ends(pipe.start, first)
-            other = replace(pipe.with_ends(second, pipe.end), label=near.new_label(), source=None)
-            near.release(out[k])
-            near.label(near.on(other), other.label)
-            out.append(other)
-        else:
-            k += 1
-    return out
-
-
-def _crossed(pipes: Sequence[Pipe], k: int) -> tuple[Pipe, tuple[FloatArray, float]] | None:
-    """Return the pipe that a pipe goes through, where, and the sine of the angle between them; None for none."""
-    pipe = pipes[k]
-    for j, main in enumerate(pipes):
-        if j == k or pipe.radius > THROUGH * main.radius:
-            continue
-        if pipe.radius > 0.95 * main.radius and (pipe.length, k) > (main.length, j):
-            continue
-        sine = float(np.linalg.norm(np.cross(pipe.direction, main.direction)))
-        if sine < math.sin(CROSSING):
-            continue
-        feet = common_perpendicular(pipe.middle, pipe.direction, main.middle, main.direction)[:2]
-        if float(np.linalg.norm(feet[0] - feet[1])) > BESIDE * main.radius:
-            continue
-        inside = abs(float((feet[0] - pipe.middle) @ pipe.direction)) < 0.5 * pipe.length - 2.0 * main.radius / sine
-        on = abs(float((feet[1] - main.middle) @ main.direction)) < 0.5 * main.length - 0.3 * pipe.radius
-        if inside and on:
-            return main, (feet[0], sine)
-    return None

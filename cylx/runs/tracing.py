@@ -21,6 +21,8 @@ CROSSING = 0.5
 """Branches that face each other meet the main within so many of its radii of each other."""
 AGAIN = 0.2
 """A pipe that lost so many radii of its length to fittings is fitted again without what it lost."""
+BY_AXES = 0.5
+"""Confidence of a fitting that nothing but the axes tells."""
 BETTER = 0.8
 """An axis moves with a fit that leaves it less than this share of its deviations."""
 
@@ -108,7 +110,7 @@ def add_bend(trace: Trace, one: FittedBend) -> None:
     fitting = Elbow(
         joins=one.pipes,
         ends=one.ends,
-        confidence=trust(len(one.indices), one.lengthwise, one.inside),
+        confidence=trust(len(one.indices), one.lengthwise, one.inside) if len(one.indices) else BY_AXES,
         inliers=len(one.indices),
         rms=one.rms,
         coverage=one.coverage,
@@ -160,7 +162,7 @@ def _add_reducer(trace: Trace, one: FittedCone) -> None:
     fitting = Reducer(
         joins=facing.pipes,
         ends=facing.ends,
-        confidence=trust(len(one.indices), one.lengthwise),
+        confidence=trust(len(one.indices), one.lengthwise) if len(one.indices) else BY_AXES,
         inliers=len(one.indices),
         rms=one.rms,
         coverage=one.coverage,
@@ -170,7 +172,7 @@ def _add_reducer(trace: Trace, one: FittedCone) -> None:
         start_radius=first.radius,
         end_radius=second.radius,
         offset=facing.offset,
-        concentric=facing.offset < max(0.4 * abs(first.radius - second.radius), 2.0 * one.std["offset"]),
+        concentric=facing.offset < max(0.4 * abs(first.radius - second.radius), 2.0 * one.std.get("offset", 0.0)),
     )
     trace.add(fitting, one.indices)
 
@@ -332,45 +334,3 @@ def add_caps(trace: Trace, near: Surroundings) -> int:
                 trace.add(fitting, cap.indices)
                 count += 1
     return count
-
-
-def drop_parts(trace: Trace) -> Trace:
-    """Return what was traced without the pipes that are parts of fittings, such as the rims of flanges."""
-    joined = {pipe for fitting in trace.fittings for pipe in fitting.joins if fitting.kind not in _OF_ONE}
-    parts = set()
-    for fitting in trace.fittings:
-        if isinstance(fitting, Flange | Inline):
-            axis = trace.pipes[fitting.joins[0]].direction
-            low, high, reach = _extent_of(fitting, axis)
-            for k, pipe in enumerate(trace.pipes):
-                if k in fitting.joins or k in joined:
-                    continue
-                away = pipe.middle - 0.5 * (low + high)
-                along = float(away @ axis)
-                beside = float(np.linalg.norm(away - along * axis))
-                inside = abs(along) + 0.4 * pipe.length < 0.5 * float(np.linalg.norm(high - low)) + 0.3 * reach
-                if inside and beside + pipe.radius < 1.15 * reach:
-                    parts.add(k)
-    kept = [k for k in range(len(trace.pipes)) if k not in parts]
-    number = {old: new for new, old in enumerate(kept)}
-    out = Trace([trace.pipes[k] for k in kept], trace.near)
-    for fitting, points in zip(trace.fittings, trace.points, strict=True):
-        if fitting.joins[0] in parts:
-            continue
-        moved = replace(fitting, joins=tuple(number[k] for k in fitting.joins))
-        if isinstance(moved, Junction):
-            main, branches = (tuple(number[k] for k in group) for group in (moved.main, moved.branches))
-            moved = replace(moved, main=main, branches=branches)
-        out.add(moved, points)
-    return out
-
-
-_OF_ONE = ("cap", "flange", "inline")
-
-
-def _extent_of(fitting: Flange | Inline, axis: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Return both ends of a fitting on its axis, and how far it reaches from it."""
-    if isinstance(fitting, Flange):
-        half = 0.5 * fitting.thickness * axis
-        return fitting.center - half, fitting.center + half, fitting.radius
-    return fitting.start, fitting.end, 0.5 * float(np.linalg.norm(fitting.end - fitting.start))

@@ -1,0 +1,53 @@
+"""Pipes that are parts of fittings, such as the rims of flanges: they are no pipes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cylx.geometry.arrays import FloatArray
+from cylx.records import Flange, Inline, Junction
+from cylx.runs.tracing import Trace
+
+
+def drop_parts(trace: Trace) -> Trace:
+    """Return what was traced without the pipes that are parts of fittings, such as the rims of flanges."""
+    joined = {pipe for fitting in trace.fittings for pipe in fitting.joins if fitting.kind not in _OF_ONE}
+    parts = set()
+    for fitting in trace.fittings:
+        if isinstance(fitting, Flange | Inline):
+            axis = trace.pipes[fitting.joins[0]].direction
+            low, high, reach = _extent_of(fitting, axis)
+            for k, pipe in enumerate(trace.pipes):
+                if k in fitting.joins or k in joined:
+                    continue
+                away = pipe.middle - 0.5 * (low + high)
+                along = float(away @ axis)
+                beside = float(np.linalg.norm(away - along * axis))
+                inside = abs(along) + 0.4 * pipe.length < 0.5 * float(np.linalg.norm(high - low)) + 0.3 * reach
+                if inside and beside + pipe.radius < 1.15 * reach:
+                    parts.add(k)
+    kept = [k for k in range(len(trace.pipes)) if k not in parts]
+    number = {old: new for new, old in enumerate(kept)}
+    out = Trace([trace.pipes[k] for k in kept], trace.near)
+    for fitting, points in zip(trace.fittings, trace.points, strict=True):
+        if fitting.joins[0] in parts:
+            continue
+        moved = replace(fitting, joins=tuple(number[k] for k in fitting.joins))
+        if isinstance(moved, Junction):
+            main, branches = (tuple(number[k] for k in group) for group in (moved.main, moved.branches))
+            moved = replace(moved, main=main, branches=branches)
+        out.add(moved, points)
+    return out
+
+
+_OF_ONE = ("cap", "flange", "inline")
+
+
+def _extent_of(fitting: Flange | Inline, axis: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return both ends of a fitting on its axis, and how far it reaches from it."""
+    if isinstance(fitting, Flange):
+        half = 0.5 * fitting.thickness * axis
+        return fitting.center - half, fitting.center + half, fitting.radius
+    return fitting.start, fitting.end, 0.5 * float(np.linalg.norm(fitting.end - fitting.start))
