@@ -39,6 +39,7 @@ def extract(
     catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
     blends: bool | None = None,
+    runs: bool = False,
     crop: Crop | None = None,
     voxel: float | None = None,
     every: int | None = None,
@@ -86,6 +87,8 @@ def extract(
     blends : bool, optional
         Whether to look for arcs that go on tangentially, such as rounds and fillets; they are in `Extraction.blends`.
         By default as configured, and that is yes.
+    runs : bool
+        Whether to join the cylinders to runs, as `cylx.find_runs` does; they are in `Extraction.piping`.
     crop : pair of triples of float or None, optional
         Smallest and largest coordinates of the points to use; None sets no bound.
     voxel : float, optional
@@ -155,7 +158,12 @@ def extract(
         cloud = given if isinstance(given, PointCloud) else PointCloud.from_array(given)
     observer = observer or SilentObserver()
     compile_kernels(observer)
-    return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
+    found = extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
+    if not runs:
+        return found
+    from cylx.api.piping import find_runs  # noqa: PLC0415  for this alone
+
+    return find_runs(found, observer=observer)
 
 
 def read_result(path: str | PathLike[str]) -> Result:
