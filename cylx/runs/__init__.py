@@ -71,7 +71,10 @@ def trace_runs(
     add_bends(trace, near)
     add_reducers(trace, near)
     add_junctions(trace, near)
-    while follow_ends(trace, near):
+    if follow_ends(trace, near):
+        while follow_ends(trace, near):
+            pass
+        trace = Trace(trim(trace, near), near)  # what was found along the runs is fitted together with the rest
         add_bends(trace, near)
         add_reducers(trace, near)
         add_junctions(trace, near)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.cylinder import axis_basis
-from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings
+from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings
+from cylx.runs.wider import LONGEST_RIM, NARROWEST, WIDEST, coaxial
 
 SECTORS = 16
-WIDEST, NARROWEST = 5.0, 1.12
-"""Radii of a flange, in those of its pipe."""
 LEAST_SECTORS = 4
 """Sectors of a slice about the axis that must hold points of something that is short along it."""
 ABOVE = 2.5
@@ -22,7 +22,12 @@ ABOVE = 2.5
 LEAST_POINTS = 12
 LONGEST_FLANGE = 1.25
 """Length of a flange or a pair along the axis, in its radius; what is longer is something else."""
-LONGEST_INLINE = 7.0
+LONGEST_INLINE = 6.0
+"""Distance of the flanges at either side of something in line, in their radius."""
+LEAST_SIDES = 5
+"""Sectors about the axis in which the rim of a flange must be seen, and its faces."""
+ABOUT = 7.0
+"""Points up to so many radii of the pipe are looked at: a wall goes on beyond what a flange could be."""
 ROUND = 0.45
 """Share of the sectors that must have points at the rim."""
 MOST_WITHIN = 0.45
@@ -75,7 +80,7 @@ class _Ring:
 
 
 def collars_of(index: int, pipes: list[Pipe], near: Surroundings, shut: tuple[bool, bool]) -> list[Collar]:
-    """Return the flanges on a pipe, and other things about it, along its axis.
+    """Return the flanges on a pipe, and what is in line between two of them, along its axis.
 
     Parameters
     ----------
@@ -88,42 +93,49 @@ def collars_of(index: int, pipes: list[Pipe], near: Surroundings, shut: tuple[bo
     """
     pipe = pipes[index]
     others = coaxial(index, pipes)
-    rims = [k for k in others if pipes[k].length < LONGEST_FLANGE * pipes[k].radius]
-    covers = [k for k in others if k not in rims]
+    rims = [k for k in others if pipes[k].length < LONGEST_RIM * pipes[k].radius]
+    covers = [pipes[k] for k in others if k not in rims]
     ring = _ring(pipe, near, [pipes[k].label for k in rims], shut)
     if len(ring.indices) < LEAST_POINTS:
         return []
-    out = []
+    flanges: list[Collar] = []
     for low, high in _short_things(ring, pipe, near):
-        margin = ON_SURFACE * pipe.spread
-        own = ring.part((ring.heights > low - margin) & (ring.heights < high + margin))
-        found = _described(own, pipe, near, ring, shut)
-        if found is not None and not _is_of_cover(found, pipe, [pipes[k] for k in covers]):
-            out.append(found)
-    return out
-
-
-def coaxial(index: int, pipes: list[Pipe]) -> list[int]:
-    """Return the wider pipes about the axis of a pipe."""
-    pipe, out = pipes[index], []
-    for k, other in enumerate(pipes):
-        if k == index or not NARROWEST * pipe.radius < other.radius < WIDEST * pipe.radius:
+        if any(abs(0.5 * (low + high) - _height(one, pipe)) < 0.6 * one.thickness for one in flanges):
             continue
-        away = other.middle - pipe.middle
-        along = float(away @ pipe.direction)
-        offset = float(np.linalg.norm(away - along * pipe.direction))
-        reach = 0.5 * (pipe.length + other.length) + other.radius
-        parallel = abs(float(other.direction @ pipe.direction)) > math.cos(0.1)
-        if parallel and offset < 0.2 * pipe.radius and abs(along) < reach:
-            out.append(k)
-    return out
+        found = _flange(ring, (low, high), pipe, near, shut)
+        if found is None or _is_of_cover(found, pipe, covers):
+            continue
+        if all(abs(_height(found, pipe) - _height(one, pipe)) > 0.5 * one.thickness for one in flanges):
+            flanges.append(found)
+    flanges.sort(key=lambda one: _height(one, pipe))
+    return _with_inlines(flanges, ring, pipe, near)
+
+
+def _height(collar: Collar, pipe: Pipe) -> float:
+    return float((collar.center - pipe.start) @ pipe.direction)
+
+
+def _with_inlines(flanges: list[Collar], ring: _Ring, pipe: Pipe, near: Surroundings) -> list[Collar]:
+    """Return flanges, and what is between two of them where the pipe is not seen; what is about that is no flange."""
+    inlines: list[Collar] = []
+    k = 0
+    while k < len(flanges):
+        for m in range(len(flanges) - 1, k, -1):
+            found = _inline(flanges[k], flanges[m], ring, pipe, near)
+            if found is not None:
+                inlines.append(found)
+                del flanges[k + 1 : m]
+                k += 1
+                break
+        k += 1
+    return [*inlines, *flanges]
 
 
 def _ring(pipe: Pipe, near: Surroundings, rims: list[int], shut: tuple[bool, bool]) -> _Ring:
     low = 0.0 if shut[0] else -1.5 * pipe.radius
     high = pipe.length + (0.0 if shut[1] else 1.5 * pipe.radius)
     inner = NARROWEST * pipe.radius + ON_SURFACE * pipe.spread
-    indices = near.about(pipe.start, pipe.direction, low, high, WIDEST * pipe.radius, inner)
+    indices = near.about(pipe.start, pipe.direction, low, high, ABOUT * pipe.radius, inner)
     indices = indices[near.free(indices, rims)]
     away = near.points[indices] - pipe.start
     first, second = axis_basis(pipe.direction)
@@ -139,7 +151,8 @@ def _short_things(ring: _Ring, pipe: Pipe, near: Surroundings) -> list[tuple[flo
     rows = np.floor((ring.heights - low) / width).astype(np.int64)
     count = int(rows.max()) + 1
     grid = np.zeros((SECTORS, count))
-    np.add.at(grid, (ring.sectors, rows), 1.0)
+    inner = ring.distances < WIDEST * pipe.radius
+    np.add.at(grid, (ring.sectors[inner], rows[inner]), 1.0)
     reach = max(int(6.0 * pipe.radius / width), 8)
     usual = np.empty_like(grid)
     for k in range(count):
@@ -171,45 +184,68 @@ def _rim_of(own: _Ring, pipe: Pipe) -> float:
     return float(np.median(at)) if len(at) else best
 
 
-def _described(own: _Ring, pipe: Pipe, near: Surroundings, ring: _Ring, shut: tuple[bool, bool]) -> Collar | None:
+def _flange(
+    ring: _Ring, seed: tuple[float, float], pipe: Pipe, near: Surroundings, shut: tuple[bool, bool]
+) -> Collar | None:
+    """Return the flange of which a short piece was seen; None if it is none."""
+    margin = ON_SURFACE * pipe.spread
+    own = ring.part((ring.heights > seed[0] - margin) & (ring.heights < seed[1] + margin))
     if len(own.indices) < LEAST_POINTS:
         return None
-    radius, margin = _rim_of(own, pipe), ON_SURFACE * pipe.spread
+    radius = _rim_of(own, pipe)
     if not 1.2 * pipe.radius < radius < 0.97 * WIDEST * pipe.radius:
         return None
-    solid = own.part(own.distances < radius + margin)
-    low, high = _faces(solid.heights, pipe.spread)
-    thickness = high - low
-    if thickness <= 0 or len(solid.indices) < LEAST_POINTS:
+    # a rim goes on from face to face
+    at_rim = np.sort(ring.heights[np.abs(ring.distances - radius) < margin])
+    breaks = np.flatnonzero(np.diff(at_rim) > max(1.5 * near.spacing, 0.15 * radius))
+    bounds = np.concatenate([[0], breaks + 1, [len(at_rim)]])
+    middle = 0.5 * (seed[0] + seed[1])
+    pieces = [at_rim[first:last] for first, last in pairwise(bounds) if last > first]
+    if not pieces:
         return None
-    middle = 0.5 * (low + high)
-    center = pipe.start + middle * pipe.direction
-    where: Literal["side", "start", "end"] = "side"
-    if middle < max(0.6 * thickness, 0.6 * pipe.radius) and not shut[0]:
-        where = "start"
-    elif middle > pipe.length - max(0.6 * thickness, 0.6 * pipe.radius) and not shut[1]:
-        where = "end"
-    if thickness > LONGEST_FLANGE * radius:
-        return _inline(own, pipe, center, radius, thickness) if where == "side" else None
+    rim_heights = min(pieces, key=lambda piece: max(piece[0] - middle, middle - piece[-1], 0.0))
+    if rim_heights[0] - margin > seed[1] or rim_heights[-1] + margin < seed[0]:
+        return None
+    about = (ring.heights > rim_heights[0] - margin) & (ring.heights < rim_heights[-1] + margin)
+    solid = ring.part(about & (ring.distances < radius + margin))
+    faces = solid.distances < radius - margin
+    low, high = _faces(solid.heights[faces] if faces.sum() >= LEAST_POINTS else solid.heights, pipe.spread)
+    if not 0 < high - low < LONGEST_FLANGE * radius or len(solid.indices) < LEAST_POINTS:
+        return None
+    return _judged(solid, ring, pipe, radius, (low, high), shut)
+
+
+def _judged(
+    solid: _Ring, ring: _Ring, pipe: Pipe, radius: float, ends: tuple[float, float], shut: tuple[bool, bool]
+) -> Collar | None:
+    """Return a flange with its evidence; None if the points do not show it."""
+    margin, (low, high) = ON_SURFACE * pipe.spread, ends
+    thickness, middle = high - low, 0.5 * (low + high)
     rim = np.abs(solid.distances - radius) < margin
     face = np.minimum(np.abs(solid.heights - low), np.abs(solid.heights - high)) < margin
     on = rim | face
     beyond = (ring.distances > radius + 1.5 * margin) & (ring.distances < 1.4 * radius + margin)
     beyond &= (ring.heights > low - margin) & (ring.heights < high + margin)
     within = ~on & (solid.heights > low) & (solid.heights < high)
-    count = int(on.sum())
-    # the rim, seen from where the pipe is seen
-    sides = len(np.unique(solid.sectors[rim]))
+    count, sides = int(on.sum()), len(np.unique(solid.sectors[rim]))
+    # of faces that are wide enough to be seen there are points, on several sides
+    wide = radius - margin - (NARROWEST * pipe.radius + margin) > 2.0 * pipe.spread
+    faces = len(np.unique(solid.sectors[face & ~rim]))
     if (
         count < LEAST_POINTS
         or within.sum() > MOST_WITHIN * count
         or beyond.sum() > MOST_BEYOND * count
-        or sides < ROUND * len(np.unique(own.sectors))
-        or sides < LEAST_SECTORS
+        or sides < max(LEAST_SIDES, ROUND * len(np.unique(solid.sectors)))
+        or (wide and faces < LEAST_SIDES)
     ):
         return None
+    where: Literal["side", "start", "end"] = "side"
+    reach = max(0.6 * thickness, 0.6 * pipe.radius)
+    if middle < reach and not shut[0]:
+        where = "start"
+    elif middle > pipe.length - reach and not shut[1]:
+        where = "end"
     errors = np.where(rim[on], solid.distances[on] - radius, 0.0)
-    rms = float(np.sqrt((errors**2).mean()))
     coverage = sides / SECTORS
     std = {
         "radius": pipe.spread / math.sqrt(max(int(rim.sum()), 1)),
@@ -217,41 +253,52 @@ def _described(own: _Ring, pipe: Pipe, near: Surroundings, ring: _Ring, shut: tu
         "center": pipe.spread / math.sqrt(max(int(face.sum()), 1)),
     }
     wrong = float(within.sum() + beyond.sum()) / count
-    confidence = float(
-        np.clip((1.0 - math.exp(-count / 15.0)) * (0.5 + 0.5 * min(1.0, 2.0 * coverage)) * (1.0 - 0.5 * wrong), 0, 0.99)
-    )
+    sure = (1.0 - math.exp(-count / 15.0)) * (0.5 + 0.5 * min(1.0, 2.0 * coverage)) * (1.0 - 0.5 * wrong)
     return Collar(
-        "flange",
-        where,
-        center,
-        radius,
-        thickness,
-        where == "side",
-        solid.indices[on],
-        rms,
-        coverage,
-        confidence,
-        std,
+        kind="flange",
+        where=where,
+        center=pipe.start + middle * pipe.direction,
+        radius=radius,
+        thickness=thickness,
+        pair=where == "side",
+        indices=solid.indices[on],
+        rms=float(np.sqrt((errors**2).mean())),
+        coverage=coverage,
+        confidence=float(np.clip(sure, 0.0, 0.99)),
+        std=std,
     )
 
 
 def _faces(heights: FloatArray, spread: float) -> tuple[float, float]:
     """Return where the points begin and end along the axis."""
     low, high = (float(value) for value in np.quantile(heights, [0.03, 0.97]))
-    first, last = heights[heights < low + 1.5 * spread], heights[heights > high - 1.5 * spread]
-    return float(np.median(first)), float(np.median(last))
+    for _ in range(4):
+        first, last = np.abs(heights - low) < 2.0 * spread, np.abs(heights - high) < 2.0 * spread
+        low = float(np.median(heights[first])) if first.any() else low
+        high = float(np.median(heights[last])) if last.any() else high
+    return low, high
 
 
-def _inline(own: _Ring, pipe: Pipe, center: FloatArray, radius: float, thickness: float) -> Collar | None:
-    """Describe something long about a pipe that is neither a flange nor a tube."""
-    if thickness > LONGEST_INLINE * radius:
+def _inline(first: Collar, second: Collar, ring: _Ring, pipe: Pipe, near: Surroundings) -> Collar | None:
+    """Return what is between two flanges, if it is about the pipe and hides it; None if there is only the pipe."""
+    low, high = _height(first, pipe) + 0.5 * first.thickness, _height(second, pipe) - 0.5 * second.thickness
+    radius = max(first.radius, second.radius)
+    margin = ON_SURFACE * pipe.spread
+    if not margin < high - low < LONGEST_INLINE * radius:
         return None
-    spread = np.abs(own.distances - np.median(own.distances)) < ON_SURFACE * pipe.spread
-    sides = len(np.unique(own.sectors))
-    if spread.mean() > 0.7 or sides < LEAST_SECTORS:
+    body = ring.part((ring.heights > low) & (ring.heights < high) & (ring.distances < 1.2 * radius))
+    own = near.about(
+        pipe.start, pipe.direction, low + margin, high - margin, pipe.radius + margin, max(0.0, pipe.radius - margin)
+    )
+    sides = len(np.unique(body.sectors))
+    seen = len(own) / max(high - low - 2.0 * margin, margin)
+    usual = near.density(pipe) * 2.0 * math.pi * pipe.radius
+    if len(body.indices) < LEAST_POINTS or sides < LEAST_SECTORS or seen > 0.4 * usual:
         return None
+    start, end = _height(first, pipe) - 0.5 * first.thickness, _height(second, pipe) + 0.5 * second.thickness
+    center = pipe.start + 0.5 * (start + end) * pipe.direction
     coverage = sides / SECTORS
-    return Collar("inline", "side", center, radius, thickness, True, own.indices, 0.0, coverage, 0.7, {})
+    return Collar("inline", "side", center, radius, end - start, True, body.indices, 0.0, coverage, 0.8, {})
 
 
 def _is_of_cover(collar: Collar, pipe: Pipe, covers: list[Pipe]) -> bool:
@@ -261,8 +308,3 @@ def _is_of_cover(collar: Collar, pipe: Pipe, covers: list[Pipe]) -> bool:
         if along < 0.5 * cover.length + cover.radius and collar.radius < 1.15 * cover.radius:
             return True
     return False
-
-
-def is_end(where: str) -> End | None:
-    """Return the end of a pipe at which something is, None for none."""
-    return "start" if where == "start" else "end" if where == "end" else None

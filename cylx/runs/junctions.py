@@ -55,7 +55,9 @@ class Branching:
     std: dict[str, float]
 
 
-def branchings(pipes: list[Pipe], taken: set[tuple[int, End]], near: Surroundings) -> Iterator[Branching]:
+def branchings(
+    pipes: list[Pipe], taken: set[tuple[int, End]], aside: set[int], near: Surroundings
+) -> Iterator[Branching]:
     """Yield the free ends that end on the surface of another pipe, nearest first for each end."""
     middles = np.array([pipe.middle for pipe in pipes]).reshape(-1, 3)
     halves = np.array([0.5 * pipe.length for pipe in pipes])
@@ -67,7 +69,7 @@ def branchings(pipes: list[Pipe], taken: set[tuple[int, End]], near: Surrounding
             reach = halves + 2.0 * radii + BEFORE * pipe.radius
             close = np.linalg.norm(middles - pipe.at(end), axis=1) < reach + 2.0 * pipe.radius
             close &= pipe.radius < WIDEST_BRANCH * radii
-            found = [_branching(pipes, i, end, int(j)) for j in np.flatnonzero(close) if j != i]
+            found = [_branching(pipes, i, end, int(j)) for j in np.flatnonzero(close) if j != i and j not in aside]
             kept = [one for one in found if one is not None and _arrives(one, pipes, near)]
             if kept:
                 yield min(kept, key=lambda one: abs(one.gap))

@@ -54,7 +54,7 @@ def follow_ends(trace: Trace, near: Surroundings) -> int:
         return count
     for index in range(len(trace.pipes)):
         for end in ENDS:
-            if (index, end) in trace.taken or (index, end) in trace.followed:
+            if index in trace.aside or (index, end) in trace.taken or (index, end) in trace.followed:
                 continue
             trace.followed.add((index, end))
             found = onward_bend(trace.pipes[index], index, end, len(trace.pipes), near)

@@ -9,12 +9,13 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Flange, Inline, Junction
 from cylx.runs.tracing import Trace
+from cylx.runs.wider import LONGEST_RIM
 
 
 def drop_parts(trace: Trace) -> Trace:
     """Return what was traced without the pipes that are parts of fittings, such as the rims of flanges."""
     joined = {pipe for fitting in trace.fittings for pipe in fitting.joins if fitting.kind not in _OF_ONE}
-    parts = set()
+    parts = {k for k in trace.aside if trace.pipes[k].length < LONGEST_RIM * trace.pipes[k].radius} - joined
     for fitting in trace.fittings:
         if isinstance(fitting, Flange | Inline):
             axis = trace.pipes[fitting.joins[0]].direction

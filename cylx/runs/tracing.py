@@ -16,6 +16,7 @@ from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
 from cylx.runs.pieces import refit
 from cylx.runs.pipes import ENDS, End, Pipe, Surroundings, tilted
+from cylx.runs.wider import wider_ones
 
 CROSSING = 0.5
 """Branches that face each other meet the main within so many of its radii of each other."""
@@ -45,6 +46,8 @@ class Trace:
         Ends that were followed onward.
     starts : list of Pipe
         The pipes before any fitting was found.
+    aside : set of int
+        Cylinders that are rims or covers of pipes.
     """
 
     pipes: list[Pipe]
@@ -55,8 +58,15 @@ class Trace:
     followed: set[tuple[int, End]] = field(default_factory=set)
     starts: list[Pipe] = field(init=False)
 
+    aside: set[int] = field(init=False)
+
     def __post_init__(self) -> None:
-        self.starts = list(self.pipes)
+        self.starts, self.aside = list(self.pipes), wider_ones(self.pipes)
+
+    @property
+    def closed(self) -> set[tuple[int, End]]:
+        """Ends that have a fitting already, and those of cylinders that are no pipes."""
+        return set(self.taken) | {(k, end) for k in self.aside for end in ENDS}
 
     def add(self, fitting: Fitting, points: IndexArray) -> None:
         """Add a fitting; the ends it joins are taken."""
@@ -79,7 +89,7 @@ def trust(inliers: int, lengthwise: float, wrong: float = 0.0) -> float:
 
 def add_bends(trace: Trace, near: Surroundings) -> int:
     """Add the elbows between pipes whose axes meet; return their number."""
-    tried = (fit_meeting(meeting, trace.pipes, near) for meeting in meetings(trace.pipes, set(trace.taken)))
+    tried = (fit_meeting(meeting, trace.pipes, near) for meeting in meetings(trace.pipes, trace.closed))
     found = sorted((one for one in tried if one is not None), key=lambda one: (-one.lengthwise, -len(one.indices)))
     count = 0
     for one in found:
@@ -142,7 +152,7 @@ def with_axis(pipe: Pipe, change: FloatArray, covariance: FloatArray) -> Pipe:
 
 def add_reducers(trace: Trace, near: Surroundings) -> int:
     """Add the reducers between ends of different radius that face each other; return their number."""
-    pairs = (one for one in facing_ends(trace.pipes, set(trace.taken)) if not one.same_size)
+    pairs = (one for one in facing_ends(trace.pipes, trace.closed) if not one.same_size)
     tried = (fit_reducer(one, trace.pipes, near) for one in pairs)
     found = sorted((one for one in tried if one is not None), key=lambda one: -len(one.indices))
     count = 0
@@ -179,7 +189,7 @@ def _add_reducer(trace: Trace, one: FittedCone) -> None:
 
 def add_junctions(trace: Trace, near: Surroundings) -> int:
     """Add the tees and crosses; return their number."""
-    found = list(branchings(trace.pipes, set(trace.taken), near))
+    found = list(branchings(trace.pipes, trace.closed, trace.aside, near))
     used: set[int] = set()
     count = 0
     for k, one in enumerate(found):
@@ -227,6 +237,8 @@ def add_collars(trace: Trace, near: Surroundings) -> int:
     """Add the flanges on pipes, and what is between them; return their number."""
     count = 0
     for index in range(len(trace.pipes)):
+        if index in trace.aside:
+            continue
         shut = (index, "start") in trace.taken, (index, "end") in trace.taken
         for collar in collars_of(index, trace.pipes, near, shut):
             _add_collar(trace, index, collar)
@@ -273,7 +285,7 @@ def _add_collar(trace: Trace, index: int, collar: Collar) -> None:
 def add_gaps(trace: Trace, near: Surroundings) -> int:
     """Add what bridges gaps between ends of one size; return their number."""
     pairs = sorted(
-        (one for one in facing_ends(trace.pipes, set(trace.taken)) if one.same_size), key=lambda one: abs(one.gap)
+        (one for one in facing_ends(trace.pipes, trace.closed) if one.same_size), key=lambda one: abs(one.gap)
     )
     count = 0
     for one in pairs:
@@ -315,7 +327,7 @@ def add_caps(trace: Trace, near: Surroundings) -> int:
     count = 0
     for index, pipe in enumerate(trace.pipes):
         for end in ENDS:
-            if (index, end) in trace.taken:
+            if (index, end) in trace.closed:
                 continue
             cap = fit_cap(pipe, end, near)
             if cap is not None:
