@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import axis_basis
 from cylx.synthetic.plant.network import Joining, Span, Straight
 from cylx.synthetic.plant.sizes import PipeSize
 from cylx.synthetic.plant.surfaces import Bend, Block, PipingSurface, Revolved, Ring, pipe
-from cylx.geometry.cylinder import axis_basis
 
 GASKET = 0.003
 """Between the discs of a pair of flanges, metres."""
@@ -102,7 +102,7 @@ def _flange(run: int, straight: int, low: FloatArray, high: FloatArray, size: Pi
     }
     surfaces: list[PipingSurface] = []
     depth = 0.5 * (thickness - GASKET) if pair else thickness
-    for inner in ((low, high - depth * axis) if pair else (low,)):
+    for inner in (low, high - depth * axis) if pair else (low,):
         surfaces.append(pipe(inner, inner + depth * axis, size.flange_radius))
     surfaces.append(Ring(low, -axis, size.radius, size.flange_radius))
     surfaces.append(Ring(high, axis, size.radius, size.flange_radius))

@@ -1,0 +1,204 @@
+"""Score fittings: match those of a result with the true ones of the same kind by place and size."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cylx.errors import InputError
+from cylx.evaluation.matching import CylinderTable, match_one_to_one, read_id, read_number, read_vector
+from cylx.evaluation.rates import Spread, rates, spread_of
+from cylx.geometry.arrays import FloatArray
+
+KINDS = ("elbow", "tee", "cross", "reducer", "flange", "inline", "cap", "joint")
+"""All kinds of fittings, in the order in which they are told."""
+PLACE_RADII = 1.0
+"""A fitting is in its place if it is nearer than so many radii of the largest cylinder that the true one joins."""
+GOOD_BEND, GOOD_ANGLE_DEG = 0.05, 1.0
+"""An elbow is well measured if its bend radius is off by no more than this share, and its angle by no more degrees."""
+_SIZES = {"elbow": ("radius",), "reducer": ("start_radius", "end_radius")}
+
+
+@dataclass(frozen=True, slots=True)
+class KindScore:
+    """The score of one kind of fittings.
+
+    Parameters
+    ----------
+    truth, predicted, matched : int
+        Number of true fittings that must be found, of fittings in the result, and of matched pairs.
+    ignored : int
+        Fittings of the result in the place of true ones, of whatever kind, that need not be found; they count neither
+        as correct nor as false.
+    precision, recall, f1 : float
+        In [0, 1]; all 1 if there is nothing to find and nothing was found.
+    missed, false : tuple of int
+        `id` of true fittings without a match, and of fittings in the result that are neither matched nor ignored.
+    """
+
+    truth: int
+    predicted: int
+    matched: int
+    ignored: int
+    precision: float
+    recall: float
+    f1: float
+    missed: tuple[int, ...]
+    false: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FittingScores:
+    """The score of the fittings of a result.
+
+    Parameters
+    ----------
+    kinds : dict of str to KindScore
+        By kind; only kinds that the truth or the result has.
+    bend_radius : Spread or None
+        Error of the bend radius over matched elbows, relative to the true one; None without any.
+    angle_deg : Spread or None
+        Error of the angle over matched elbows, degrees.
+    good_elbows : float or None
+        Share of the matched elbows whose bend radius is within 5 % and whose angle is within 1 degree.
+    """
+
+    kinds: dict[str, KindScore]
+    bend_radius: Spread | None
+    angle_deg: Spread | None
+    good_elbows: float | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fitting:
+    """What is compared of a fitting: kind, id, place, sizes, scale of the tolerance, bend radius and angle."""
+
+    kind: str
+    id: int
+    place: FloatArray
+    sizes: tuple[float, ...]
+    scale: float
+    bend: tuple[float, float]
+    ignore: bool
+
+
+def score_fittings(
+    truth: Mapping[str, object], result: Mapping[str, object], known: CylinderTable, radius: float
+) -> FittingScores | None:
+    """Match the fittings of a result with the true ones, one to one, and score them by kind.
+
+    A pair is admissible if both are of one kind, their places differ by less than the largest radius of the cylinders
+    that the true one joins, and the radii of an elbow and of both ends of a reducer are within their limit. The place
+    of an elbow is the middle of its centre line, that of any other fitting its `center`.
+
+    Parameters
+    ----------
+    truth, result : mapping
+        JSON objects.
+    known : CylinderTable
+        The true cylinders.
+    radius : float
+        Limit of the relative error of a radius.
+
+    Returns
+    -------
+    scores : FittingScores or None
+        None unless both documents list `fittings`.
+
+    Raises
+    ------
+    InputError
+        If a list is malformed.
+    """
+    if "fittings" not in truth or "fittings" not in result:
+        return None
+    radii = dict(zip(known.ids, known.radii.tolist(), strict=True))
+    true, found = _read(truth, "truth", radii), _read(result, "result", {})
+    near = _nearness(true, found)
+    kinds, pairs = {}, []
+    for kind in KINDS:
+        rows = [i for i, one in enumerate(true) if one.kind == kind and not one.ignore]
+        columns = [j for j, one in enumerate(found) if one.kind == kind]
+        fits = np.array([[_sizes_agree(true[i], found[j], radius) for j in columns] for i in rows], dtype=bool)
+        cost = near[np.ix_(rows, columns)]
+        matched = match_one_to_one(cost, (cost < 1) & fits.reshape(cost.shape))
+        pairs += [(true[rows[i]], found[columns[j]]) for i, j in zip(*matched, strict=True)]
+        left = set(columns) - {columns[j] for j in matched[1]}
+        free = {j for j in left if any(one.ignore and near[i, j] < 1 for i, one in enumerate(true))}
+        missed = [true[i].id for k, i in enumerate(rows) if k not in matched[0]]
+        false = [found[j].id for j in columns if j in left - free]
+        if rows or columns:
+            counts = (len(rows), len(columns), len(matched[0]), len(free))
+            kinds[kind] = KindScore(*counts, *rates(counts[2], len(false), len(missed)), tuple(missed), tuple(false))
+    return FittingScores(kinds, *_elbow_errors([pair for pair in pairs if pair[0].kind == "elbow"]))
+
+
+def _nearness(true: Sequence[_Fitting], found: Sequence[_Fitting]) -> FloatArray:
+    """Return the distance of the places of all pairs over the tolerance; infinite where it is not a number."""
+    tolerance = PLACE_RADII * np.array([one.scale for one in true])
+    places = np.array([one.place for one in found]).reshape(-1, 3)
+    rows = [np.linalg.norm(places - one.place, axis=1) for one in true]
+    distances = np.array(rows).reshape(len(true), len(found)) / tolerance[:, None]
+    return np.asarray(np.where(np.isfinite(distances), distances, np.inf))
+
+
+def _sizes_agree(true: _Fitting, found: _Fitting, limit: float) -> bool:
+    pairs = zip(true.sizes, found.sizes, strict=True)
+    return all(abs(own - known) < limit * known for known, own in pairs)
+
+
+def _elbow_errors(
+    pairs: Sequence[tuple[_Fitting, _Fitting]],
+) -> tuple[Spread | None, Spread | None, float | None]:
+    bends = [abs(found.bend[0] - true.bend[0]) / true.bend[0] for true, found in pairs]
+    angles = [abs(found.bend[1] - true.bend[1]) for true, found in pairs]
+    good = [bend <= GOOD_BEND and angle <= GOOD_ANGLE_DEG for bend, angle in zip(bends, angles, strict=True)]
+    return spread_of(bends), spread_of(angles), sum(good) / len(good) if good else None
+
+
+def _read(document: Mapping[str, object], place: str, radii: Mapping[int, float]) -> list[_Fitting]:
+    """Read the fittings of a document; with `radii`, those of its cylinders by id, they are the truth."""
+    entries = document["fittings"]
+    if not isinstance(entries, list | tuple):
+        raise InputError(f"{place}.fittings", "is not a list", "give a list of fittings, or leave it out")
+    found = []
+    for index, entry in enumerate(entries):
+        here = f"{place}.fittings[{index}]"
+        if not isinstance(entry, Mapping):
+            raise InputError(here, "is not an object", "give each fitting as an object with its keys")
+        found.append(_read_one(entry, index, here, radii))
+    return found
+
+
+def _read_one(entry: Mapping[str, object], index: int, here: str, radii: Mapping[int, float]) -> _Fitting:
+    kind = entry.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(f"{here}.kind", f"is not a kind of fitting: {kind!r}", f"give one of {', '.join(KINDS)}")
+    where = np.array(read_vector(entry, "center", here))
+    bend = (np.nan, np.nan)
+    if kind == "elbow":
+        bend = (
+            read_number(entry.get("bend_radius"), f"{here}.bend_radius"),
+            read_number(entry.get("angle_deg"), f"{here}.angle_deg"),
+        )
+        where = _middle_of_bend(where, *(np.array(read_vector(entry, key, here)) for key in ("start", "end")))
+    sizes = tuple(sorted(read_number(entry.get(key), f"{here}.{key}") for key in _SIZES.get(kind, ())))
+    scale = np.nan
+    if radii:
+        joins = entry.get("joins")
+        joined = [radii[one] for one in joins if one in radii] if isinstance(joins, list | tuple) else []
+        if not joined or not np.isfinite(where).all():
+            raise InputError(here, "joins no true cylinder, or has no finite place", "correct its 'joins' and numbers")
+        scale = max(joined)
+    return _Fitting(
+        kind, read_id(entry.get("id", index), f"{here}.id"), where, sizes, scale, bend, bool(entry.get("ignore", False))
+    )
+
+
+def _middle_of_bend(center: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the middle of an arc of less than half a turn."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is not finite matches nothing
+        halfway = 0.5 * (start + end) - center
+        return np.asarray(center + halfway * np.linalg.norm(start - center) / np.linalg.norm(halfway))

@@ -1,0 +1,86 @@
+"""A true cylinder that something interrupts, as a flange or a gap does, may be found in pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cylx.errors import InputError
+from cylx.evaluation.matching import CylinderTable
+from cylx.geometry.arrays import MaskArray
+
+_MOST_OVERLAP = 0.5  # of the shorter one: two that overlap more are one piece twice
+
+
+def read_pieces(truth: Mapping[str, object], place: str) -> list[int]:
+    """Return the number of pieces of each true cylinder: the length of its list `pieces`, 1 without it.
+
+    Parameters
+    ----------
+    truth : mapping
+        With a list `cylinders` of objects.
+    place : str
+        Name of the truth in errors.
+
+    Raises
+    ------
+    InputError
+        If `pieces` is not a list.
+    """
+    counts = []
+    entries = truth["cylinders"]
+    assert isinstance(entries, list | tuple)
+    for index, entry in enumerate(entries):
+        pieces = entry.get("pieces", ())
+        if not isinstance(pieces, list | tuple):
+            where = f"{place}.cylinders[{index}].pieces"
+            raise InputError(where, "is not a list", "give a list of pairs of points, or leave it out")
+        counts.append(max(1, len(pieces)))
+    return counts
+
+
+def further_pieces(
+    known: CylinderTable, found: CylinderTable, pieces: list[int], admissible: MaskArray, matched: Mapping[int, int]
+) -> dict[int, int]:
+    """Return the cylinders found on another piece of a true one that is matched already.
+
+    Parameters
+    ----------
+    known, found : CylinderTable
+        The truth and the result.
+    pieces : list of int
+        Number of pieces of each true cylinder: at most so many cylinders are found on it.
+    admissible : ndarray of shape (known, found), bool
+        Which pairs are near enough.
+    matched : mapping of int to int
+        Row of `known` by row of `found`.
+
+    Returns
+    -------
+    further : dict of int to int
+        Row of `known` by row of `found`, for cylinders that overlap with none of the others on the same true one.
+    """
+    further: dict[int, int] = {}
+    for j, i in matched.items():
+        if pieces[i] == 1:
+            continue
+        taken = [_stretch(known, i, found, j)]
+        others = [int(k) for k in np.flatnonzero(admissible[i]) if int(k) not in matched and int(k) not in further]
+        for k in sorted(others, key=lambda k: -np.nan_to_num(found.heights[k])):
+            stretch = _stretch(known, i, found, k)
+            if len(taken) < pieces[i] and all(_are_apart(stretch, one) for one in taken):
+                taken.append(stretch)
+                further[k] = i
+    return further
+
+
+def _stretch(known: CylinderTable, i: int, found: CylinderTable, j: int) -> tuple[float, float]:
+    """Return from where to where a found cylinder reaches along a true one's axis; NaN if its height is unknown."""
+    middle = float((found.points[j] - known.points[i]) @ known.directions[i])
+    return middle - 0.5 * float(found.heights[j]), middle + 0.5 * float(found.heights[j])
+
+
+def _are_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    overlap = min(one[1], other[1]) - max(one[0], other[0])
+    return overlap <= _MOST_OVERLAP * min(one[1] - one[0], other[1] - other[0])  # false if any of them is NaN
