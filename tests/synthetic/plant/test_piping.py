@@ -1,7 +1,7 @@
 """Scenes of piping: what the truth says of runs and fittings must be so in the cloud."""
 
 import json
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
@@ -209,7 +209,7 @@ def test_nothing_interpenetrates_unless_it_is_joined(truth):
         line = centre_line(entry, cylinders)
         if line is None:
             continue
-        for start, end in zip(line[0][:-1], line[0][1:], strict=True):
+        for start, end in pairwise(line[0]):
             gaps = segment_distances(start, end, starts, ends) - radii - line[1]
             strangers = [
                 one["id"] not in entry["joins"] and one.get("insulates") not in entry["joins"] for one in straights
@@ -237,7 +237,7 @@ def test_points_are_seen_by_a_scanner(scene, truth):
 
 
 def _clear(way, line, radius):
-    for start, end in zip(line[:-1], line[1:], strict=True):
+    for start, end in pairwise(line):
         along = np.clip((way - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
         flat = (along > 0) & (along < 1)
         if (np.linalg.norm(way - start - along[:, None] * (end - start), axis=1)[flat] < 0.97 * radius - 0.001).any():
