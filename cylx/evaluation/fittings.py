@@ -10,7 +10,7 @@ import numpy as np
 from cylx.errors import InputError
 from cylx.evaluation.matching import CylinderTable, match_one_to_one, read_id, read_number, read_vector
 from cylx.evaluation.rates import Spread, rates, spread_of
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, MaskArray
 
 KINDS = ("elbow", "tee", "cross", "reducer", "flange", "inline", "cap", "joint")
 """All kinds of fittings, in the order in which they are told."""
@@ -18,6 +18,8 @@ PLACE_RADII = 1.0
 """A fitting is in its place if it is nearer than so many radii of the largest cylinder that the true one joins."""
 GOOD_BEND, GOOD_ANGLE_DEG = 0.05, 1.0
 """An elbow is well measured if its bend radius is off by no more than this share, and its angle by no more degrees."""
+_HALF_TURN = 1e-6  # ends that are so far from opposite each other, in bend radii, do not say where the middle is
+_BENDS = {"elbow": ("bend_radius", "angle_deg")}
 _SIZES = {"elbow": ("radius",), "reducer": ("start_radius", "end_radius")}
 
 
@@ -73,14 +75,14 @@ class FittingScores:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Fitting:
-    """What is compared of a fitting: kind, id, place, sizes, scale of the tolerance, bend radius and angle."""
+    """What is compared of a fitting; the place is NaN if any number is not finite, and then it matches nothing."""
 
     kind: str
     id: int
     place: FloatArray
     sizes: tuple[float, ...]
     scale: float
-    bend: tuple[float, float]
+    bend: tuple[float, ...]
     ignore: bool
 
 
@@ -115,19 +117,20 @@ def score_fittings(
     if "fittings" not in truth or "fittings" not in result:
         return None
     radii = dict(zip(known.ids, known.radii.tolist(), strict=True))
-    true, found = _read(truth, "truth", radii), _read(result, "result", {})
+    true, found = _read(truth, "truth", radii), _read(result, "result", None)
     near = _nearness(true, found)
+    at_ignored = set(np.flatnonzero((near[[one.ignore for one in true]] < 1).any(axis=0)).tolist())
     kinds, pairs = {}, []
     for kind in KINDS:
         rows = [i for i, one in enumerate(true) if one.kind == kind and not one.ignore]
         columns = [j for j, one in enumerate(found) if one.kind == kind]
-        fits = np.array([[_sizes_agree(true[i], found[j], radius) for j in columns] for i in rows], dtype=bool)
         cost = near[np.ix_(rows, columns)]
-        matched = match_one_to_one(cost, (cost < 1) & fits.reshape(cost.shape))
+        fits = _sizes_agree([true[i].sizes for i in rows], [found[j].sizes for j in columns], radius)
+        matched = match_one_to_one(cost, (cost < 1) & fits)
         pairs += [(true[rows[i]], found[columns[j]]) for i, j in zip(*matched, strict=True)]
         left = set(columns) - {columns[j] for j in matched[1]}
-        free = {j for j in left if any(one.ignore and near[i, j] < 1 for i, one in enumerate(true))}
-        missed = [true[i].id for k, i in enumerate(rows) if k not in matched[0]]
+        free = left & at_ignored
+        missed = [true[i].id for k, i in enumerate(rows) if k not in set(matched[0].tolist())]
         false = [found[j].id for j in columns if j in left - free]
         if rows or columns:
             counts = (len(rows), len(columns), len(matched[0]), len(free))
@@ -137,16 +140,21 @@ def score_fittings(
 
 def _nearness(true: Sequence[_Fitting], found: Sequence[_Fitting]) -> FloatArray:
     """Return the distance of the places of all pairs over the tolerance; infinite where it is not a number."""
-    tolerance = PLACE_RADII * np.array([one.scale for one in true])
     places = np.array([one.place for one in found]).reshape(-1, 3)
-    rows = [np.linalg.norm(places - one.place, axis=1) for one in true]
-    distances = np.array(rows).reshape(len(true), len(found)) / tolerance[:, None]
+    distances = np.empty((len(true), len(found)))
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is nowhere
+        for i, one in enumerate(true):
+            distances[i] = np.linalg.norm(places - one.place, axis=1) / (PLACE_RADII * one.scale)
     return np.asarray(np.where(np.isfinite(distances), distances, np.inf))
 
 
-def _sizes_agree(true: _Fitting, found: _Fitting, limit: float) -> bool:
-    pairs = zip(true.sizes, found.sizes, strict=True)
-    return all(abs(own - known) < limit * known for known, own in pairs)
+def _sizes_agree(true: Sequence[tuple[float, ...]], found: Sequence[tuple[float, ...]], limit: float) -> MaskArray:
+    """Return which pairs agree in all sizes, each relative to the true one; shape (true, found)."""
+    if not (true and found):
+        return np.zeros((len(true), len(found)), dtype=bool)
+    known, own = np.array(true, dtype=np.float64), np.array(found, dtype=np.float64)
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite agrees with nothing
+        return np.asarray((np.abs(own - known[:, None]) < limit * known[:, None]).all(axis=2))
 
 
 def _elbow_errors(
@@ -158,7 +166,7 @@ def _elbow_errors(
     return spread_of(bends), spread_of(angles), sum(good) / len(good) if good else None
 
 
-def _read(document: Mapping[str, object], place: str, radii: Mapping[int, float]) -> list[_Fitting]:
+def _read(document: Mapping[str, object], place: str, radii: Mapping[int, float] | None) -> list[_Fitting]:
     """Read the fittings of a document; with `radii`, those of its cylinders by id, they are the truth."""
     entries = document["fittings"]
     if not isinstance(entries, list | tuple):
@@ -172,33 +180,44 @@ def _read(document: Mapping[str, object], place: str, radii: Mapping[int, float]
     return found
 
 
-def _read_one(entry: Mapping[str, object], index: int, here: str, radii: Mapping[int, float]) -> _Fitting:
+def _read_one(entry: Mapping[str, object], index: int, here: str, radii: Mapping[int, float] | None) -> _Fitting:
     kind = entry.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(f"{here}.kind", f"is not a kind of fitting: {kind!r}", f"give one of {', '.join(KINDS)}")
     where = np.array(read_vector(entry, "center", here))
-    bend = (np.nan, np.nan)
+    bend, sizes = (_numbers(entry, names.get(kind, ()), here) for names in (_BENDS, _SIZES))
     if kind == "elbow":
-        bend = (
-            read_number(entry.get("bend_radius"), f"{here}.bend_radius"),
-            read_number(entry.get("angle_deg"), f"{here}.angle_deg"),
-        )
-        where = _middle_of_bend(where, *(np.array(read_vector(entry, key, here)) for key in ("start", "end")))
-    sizes = tuple(sorted(read_number(entry.get(key), f"{here}.{key}") for key in _SIZES.get(kind, ())))
-    scale = np.nan
-    if radii:
-        joins = entry.get("joins")
-        joined = [radii[one] for one in joins if one in radii] if isinstance(joins, list | tuple) else []
-        if not joined or not np.isfinite(where).all():
-            raise InputError(here, "joins no true cylinder, or has no finite place", "correct its 'joins' and numbers")
-        scale = max(joined)
-    return _Fitting(
-        kind, read_id(entry.get("id", index), f"{here}.id"), where, sizes, scale, bend, bool(entry.get("ignore", False))
-    )
+        start, end, normal = (np.array(read_vector(entry, key, here)) for key in ("start", "end", "normal"))
+        where = _middle_of_bend(where, start, end, normal)
+    if not np.isfinite([*bend, *sizes]).all():
+        where = np.full(3, np.nan)
+    scale = np.nan if radii is None else _scale_of(entry, where, (*bend, *sizes), here, radii)
+    own_id, ignore = read_id(entry.get("id", index), f"{here}.id"), bool(entry.get("ignore", False))
+    return _Fitting(kind, own_id, where, tuple(sorted(sizes)), scale, bend, ignore)
 
 
-def _middle_of_bend(center: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return the middle of an arc of less than half a turn."""
+def _numbers(entry: Mapping[str, object], keys: Sequence[str], here: str) -> tuple[float, ...]:
+    return tuple(read_number(entry.get(key), f"{here}.{key}") for key in keys)
+
+
+def _scale_of(
+    entry: Mapping[str, object], where: FloatArray, sizes: Sequence[float], here: str, radii: Mapping[int, float]
+) -> float:
+    """Return the largest radius of the cylinders that a true fitting joins."""
+    joins = entry.get("joins")
+    listed = joins if isinstance(joins, list | tuple) else ()
+    joined = [radii[one] for one in listed if isinstance(one, int) and one in radii]
+    if not joined:
+        raise InputError(f"{here}.joins", "names no cylinder of the truth", "list the ids of those it joins")
+    if not (np.isfinite(where).all() and all(size > 0 for size in sizes)):
+        raise InputError(here, "has no finite place or no sizes > 0", "correct its numbers, or leave it out")
+    return max(joined)
+
+
+def _middle_of_bend(center: FloatArray, start: FloatArray, end: FloatArray, normal: FloatArray) -> FloatArray:
+    """Return the middle of an arc of up to half a turn."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is not finite matches nothing
-        halfway = 0.5 * (start + end) - center
-        return np.asarray(center + halfway * np.linalg.norm(start - center) / np.linalg.norm(halfway))
+        halfway, reach = 0.5 * (start + end) - center, np.linalg.norm(start - center)
+        if np.linalg.norm(halfway) < _HALF_TURN * reach:
+            halfway = np.cross(normal, start - center)
+        return np.asarray(center + halfway * reach / np.linalg.norm(halfway))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import combinations
 
 from cylx.errors import InputError
 from cylx.evaluation.matching import read_id
@@ -58,11 +58,15 @@ def score_runs(
     in_truth = {cylinder: run for run, cylinders in enumerate(known) for cylinder in cylinders}
     in_result = {cylinder: run for run, cylinders in enumerate(given) for cylinder in cylinders}
     straights = [(in_truth[true], in_result.get(own)) for own, true in true_of.items() if true in in_truth]
-    both = right = claimed = 0
-    for (true, own), (other_true, other_own) in combinations(straights, 2):
-        together, said = true == other_true, own is not None and own == other_own
-        both, right, claimed = both + (together and said), right + together, claimed + said
+    right = _pairs(true for true, _ in straights)
+    claimed = _pairs(own for _, own in straights if own is not None)
+    both = _pairs(pair for pair in straights if pair[1] is not None)
     return RunScore(len(known), len(given), right, claimed, both, *rates(both, claimed - both, right - both))
+
+
+def _pairs(groups: Iterable[object]) -> int:
+    """Return the number of pairs in one group."""
+    return sum(n * (n - 1) // 2 for n in Counter(groups).values())
 
 
 def _read(document: Mapping[str, object], place: str) -> list[list[int]]:

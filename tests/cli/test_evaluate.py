@@ -51,7 +51,15 @@ def test_it_says_how_good_a_result_is(run_cylx, files):
 
 
 def test_fittings_and_runs_have_lines_of_their_own(run_cylx, files):
-    bend = {"kind": "elbow", "joins": [0, 1], "center": [0, 3, 0], "start": [0, 0, 0], "end": [3, 3, 0], "radius": 1}
+    bend = {
+        "kind": "elbow",
+        "joins": [0, 1],
+        "center": [0, 3, 0],
+        "start": [0, 0, 0],
+        "end": [3, 3, 0],
+        "normal": [0, 0, 1],
+        "radius": 1,
+    }
     for path, radius, angle in ((files[0], 3.03, 90.5), (files[1], 3, 90)):
         content = json.loads(path.read_bytes())
         fittings = [

@@ -115,6 +115,11 @@ def test_a_long_bend_is_where_its_arc_is_and_not_where_its_centre_is():
     assert scores.bend_radius.max == pytest.approx(0.5)
 
 
+def test_a_half_turn_has_a_middle_by_its_normal():
+    assert judged([elbow(angle_deg=180.0)], [elbow(angle_deg=179.9)]).good_elbows == 1
+    assert judged([elbow(angle_deg=180.0)], [elbow(angle_deg=180.0, normal=[0, 0, -1])]).kinds["elbow"].matched == 0
+
+
 def test_a_second_one_is_false_and_the_nearest_is_matched():
     score = judged([fitting("cap")], [fitting("cap", (0.5, 0, 0)), fitting("cap", (0.1, 0, 0))]).kinds["cap"]
     assert (score.matched, score.false) == (1, (0,))
@@ -139,7 +144,8 @@ def test_numbers_that_are_none_match_nothing():
     found = [elbow(center=[math.nan, 0, 0]), elbow(radius=math.nan), fitting("cap", (math.inf, 0, 0))]
     kinds = judged([elbow(), fitting("cap")], found).kinds
     assert (kinds["elbow"].matched, kinds["elbow"].predicted, kinds["cap"].matched) == (0, 2, 0)
-    assert judged([elbow()], [elbow(bend_radius=3.0, angle_deg=math.nan, end=[3, 3, 0])]).good_elbows == 0
+    scores = judged([elbow()], [elbow(bend_radius=3.0, angle_deg=math.nan, end=[3, 3, 0])])
+    assert (scores.kinds["elbow"].matched, scores.angle_deg) == (0, None)
 
 
 def test_empty_lists():
@@ -161,13 +167,21 @@ def test_empty_lists():
         ([{"kind": "cap"}], "truth.fittings[0].center: is missing; give three numbers"),
         ([fitting("elbow")], "truth.fittings[0].bend_radius: is missing; give a number"),
         (
-            [fitting("elbow", bend_radius=1, angle_deg=1)],
+            [fitting("elbow", bend_radius=1, angle_deg=1, radius=1)],
             "truth.fittings[0].start: is missing; give three numbers",
         ),
         ([fitting("reducer")], "truth.fittings[0].start_radius: is missing; give a number"),
         (
             [fitting("cap", joins=[9])],
-            "truth.fittings[0]: joins no true cylinder, or has no finite place; correct its 'joins' and numbers",
+            "truth.fittings[0].joins: names no cylinder of the truth; list the ids of those it joins",
+        ),
+        (
+            [fitting("cap", (math.nan, 0, 0))],
+            "truth.fittings[0]: has no finite place or no sizes > 0; correct its numbers, or leave it out",
+        ),
+        (
+            [elbow(0.0)],
+            "truth.fittings[0]: has no finite place or no sizes > 0; correct its numbers, or leave it out",
         ),
         (
             [fitting("cap", id="a")],
