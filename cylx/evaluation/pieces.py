@@ -1,4 +1,4 @@
-"""A true cylinder that something interrupts, as a flange or a gap does, may be found in pieces."""
+"""True cylinders that something interrupts may be found in pieces, and true ones in line as one that goes through."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from cylx.evaluation.matching import CylinderTable
 from cylx.geometry.arrays import MaskArray
 
 _MOST_OVERLAP = 0.5  # of the shorter one: two that overlap more are one piece twice
+_LEAST_COVERED = 0.5  # of a true cylinder: one that is in line with it and covers less has not found it
 
 
 def read_pieces(truth: Mapping[str, object], place: str) -> list[int]:
-    """Return the number of pieces of each true cylinder: the length of its list `pieces`, 1 without it.
+    """Return the number of pieces of each true cylinder: the length of its list `pieces`, 0 without it.
 
     Parameters
     ----------
@@ -32,7 +33,10 @@ def read_pieces(truth: Mapping[str, object], place: str) -> list[int]:
     entries = truth["cylinders"]
     assert isinstance(entries, list | tuple)
     for index, entry in enumerate(entries):
-        pieces = entry.get("pieces", ())
+        pieces = entry.get("pieces")
+        if pieces is None:
+            counts.append(0)
+            continue
         if not isinstance(pieces, list | tuple):
             where = f"{place}.cylinders[{index}].pieces"
             raise InputError(where, "is not a list", "give a list of pairs of points, or leave it out")
@@ -63,7 +67,7 @@ def further_pieces(
     """
     further: dict[int, int] = {}
     for j, i in matched.items():
-        if pieces[i] == 1:
+        if pieces[i] < 2:
             continue
         taken = [_stretch(known, i, found, j)]
         others = [int(k) for k in np.flatnonzero(admissible[i]) if int(k) not in matched and int(k) not in further]
@@ -73,6 +77,31 @@ def further_pieces(
                 taken.append(stretch)
                 further[k] = i
     return further
+
+
+def passed_through(
+    known: CylinderTable, found: CylinderTable, pieces: list[int], admissible: MaskArray, matched: Mapping[int, int]
+) -> MaskArray:
+    """Return which true cylinders with `pieces` are covered by a cylinder that matches another one in line with them.
+
+    Such are the two branches of a cross: nobody sees whether one pipe goes through. The parameters are those of
+    `further_pieces`.
+
+    Returns
+    -------
+    passed : ndarray of shape (known,), bool
+        Only true cylinders without a match of their own.
+    """
+    passed, own = np.zeros(len(known), dtype=bool), set(matched.values())
+    for i in range(len(known)):
+        if not pieces[i] or i in own:
+            continue
+        half = 0.5 * float(known.heights[i])
+        for j in np.flatnonzero(admissible[i]):
+            low, high = _stretch(known, i, found, int(j))
+            if int(j) in matched and min(high, half) - max(low, -half) >= _LEAST_COVERED * 2 * half:
+                passed[i] = True
+    return passed
 
 
 def _stretch(known: CylinderTable, i: int, found: CylinderTable, j: int) -> tuple[float, float]:

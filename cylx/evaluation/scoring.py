@@ -10,7 +10,7 @@ import numpy as np
 from cylx.errors import UsageError
 from cylx.evaluation.fittings import FittingScores, score_fittings
 from cylx.evaluation.matching import match_one_to_one, pair_errors, read_cylinders, require_usable
-from cylx.evaluation.pieces import further_pieces, read_pieces
+from cylx.evaluation.pieces import further_pieces, passed_through, read_pieces
 from cylx.evaluation.rates import Spread, rates, spread_of
 from cylx.evaluation.runs import RunScore, score_runs
 from cylx.geometry.arrays import MaskArray
@@ -146,7 +146,9 @@ def evaluate(
     unmatched = np.ones(len(found), dtype=bool)
     unmatched[columns] = False
     on_true = dict(zip(columns.tolist(), rows.tolist(), strict=True))
-    further = further_pieces(known, found, read_pieces(truth, "truth"), admissible & asked[:, None], on_true)
+    pieces, near = read_pieces(truth, "truth"), admissible & asked[:, None]
+    asked &= ~passed_through(known, found, pieces, near, on_true)
+    further = further_pieces(known, found, pieces, near, on_true)
     on_true |= further
     unmatched[list(further)] = False
     duplicate = unmatched & admissible[asked].any(axis=0)

@@ -29,6 +29,26 @@ def test_a_further_piece_is_neither_right_nor_false(found, counts):
     assert outcome.recall == 1
 
 
+LOWER, UPPER = ({**one, "pieces": [[[0, 0, 0], [0, 0, 1]]]} for one in (LOW, HIGH))
+
+
+@pytest.mark.parametrize(
+    ("found", "counts"),
+    [
+        ([cylinder(height=20.0)], (1, 1, 0)),
+        ([LOW, HIGH], (2, 2, 0)),
+        ([LOW], (2, 1, 1)),
+        ([cylinder(point=(0, 0, -3), height=14.0)], (2, 1, 1)),  # too little of the upper one
+        ([cylinder(height=None)], (2, 1, 1)),
+    ],
+    ids=["through", "both", "one", "hardly through", "unknown height"],
+)
+def test_one_that_goes_through_two_in_line_misses_none(found, counts):
+    outcome = evaluate(document(LOWER, UPPER), document(*found))
+    assert (outcome.truth, outcome.matched, len(outcome.missed)) == counts
+    assert evaluate(document(LOW, HIGH), document(*found)).truth == 2
+
+
 def test_without_pieces_a_second_one_is_false():
     outcome = evaluate(document(cylinder(height=20.0)), document(LOW, HIGH))
     assert (outcome.matched, outcome.duplicates, outcome.ignored) == (1, 1, 0)
