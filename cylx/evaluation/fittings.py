@@ -93,7 +93,8 @@ def score_fittings(
 
     A pair is admissible if both are of one kind, their places differ by less than the largest radius of the cylinders
     that the true one joins, and the radii of an elbow and of both ends of a reducer are within their limit. The place
-    of an elbow is the middle of its centre line, that of any other fitting its `center`.
+    of an elbow is the middle of its centre line, that of any other fitting its `center`, or halfway between `start` and
+    `end` if it has no `center`.
 
     Parameters
     ----------
@@ -184,7 +185,10 @@ def _read_one(entry: Mapping[str, object], index: int, here: str, radii: Mapping
     kind = entry.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise InputError(f"{here}.kind", f"is not a kind of fitting: {kind!r}", f"give one of {', '.join(KINDS)}")
-    where = np.array(read_vector(entry, "center", here))
+    between = "center" not in entry and "start" in entry and "end" in entry
+    places = [np.array(read_vector(entry, key, here)) for key in (("start", "end") if between else ("center",))]
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite matches nothing
+        where = np.mean(places, axis=0)
     bend, sizes = (_numbers(entry, names.get(kind, ()), here) for names in (_BENDS, _SIZES))
     if kind == "elbow":
         start, end, normal = (np.array(read_vector(entry, key, here)) for key in ("start", "end", "normal"))
@@ -215,9 +219,11 @@ def _scale_of(
 
 
 def _middle_of_bend(center: FloatArray, start: FloatArray, end: FloatArray, normal: FloatArray) -> FloatArray:
-    """Return the middle of an arc of up to half a turn."""
+    """Return the middle of an arc of up to half a turn; of a mitre, all places are the same."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # what is not finite matches nothing
         halfway, reach = 0.5 * (start + end) - center, np.linalg.norm(start - center)
+        if reach == 0:
+            return center
         if np.linalg.norm(halfway) < _HALF_TURN * reach:
             halfway = np.cross(normal, start - center)
         return np.asarray(center + halfway * reach / np.linalg.norm(halfway))

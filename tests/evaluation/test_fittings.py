@@ -115,6 +115,18 @@ def test_a_long_bend_is_where_its_arc_is_and_not_where_its_centre_is():
     assert scores.bend_radius.max == pytest.approx(0.5)
 
 
+def test_ends_say_where_the_middle_is():
+    ends = {"kind": "inline", "joins": [0], "start": [0, 0, -3], "end": [0, 0, 3.5]}
+    assert judged([fitting("inline")], [ends]).kinds["inline"].matched == 1
+    assert judged([fitting("inline", (0, 0, 2))], [ends]).kinds["inline"].matched == 0
+
+
+def test_a_mitre_is_an_elbow_without_a_bend():
+    corner = {"center": [0.5, 0, 0], "start": [0.5, 0, 0], "end": [0.5, 0, 0]}
+    scores = judged([elbow(0.5)], [elbow(0.0, **corner)])
+    assert (scores.kinds["elbow"].matched, scores.bend_radius.max, scores.good_elbows) == (1, 1, 0)
+
+
 def test_a_half_turn_has_a_middle_by_its_normal():
     assert judged([elbow(angle_deg=180.0)], [elbow(angle_deg=179.9)]).good_elbows == 1
     assert judged([elbow(angle_deg=180.0)], [elbow(angle_deg=180.0, normal=[0, 0, -1])]).kinds["elbow"].matched == 0

@@ -115,7 +115,7 @@ class Layout:
             self._end(run, line, backwards=False)
         head = self.straights[first]
         if through_wall:
-            self.ends.append(OpenEnd(run, first, head.start, "leaves the cloud"))
+            self.ends.append(OpenEnd(run, first, head.start, "leaves_cloud"))
         else:
             self._end(run, Cursor(head.start, -head.direction, head.size, first, (self._first_part,)), backwards=True)
         return True
@@ -299,4 +299,4 @@ class Layout:
             straight.spans.append(Span("flange", *ends))
             self.joinings.append(built_flange(run, cursor.straight, inner, cursor.point, cursor.size))
             self.space.add(inner, cursor.point, disc, cursor.parts[-1])
-        self.ends.append(OpenEnd(run, cursor.straight, cursor.point, "nothing there"))
+        self.ends.append(OpenEnd(run, cursor.straight, cursor.point, "nothing_there"))

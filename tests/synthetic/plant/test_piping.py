@@ -189,7 +189,7 @@ def test_every_end_is_joined_capped_or_open(truth):
         caps = sum(one["kind"] == "cap" for one in fittings)
         assert 2 * len(run["cylinders"]) == joints + branches + caps + len(run["open_ends"])
         for end in run["open_ends"]:
-            assert end["reason"] in {"nothing there", "leaves the cloud"}
+            assert end["reason"] in {"nothing_there", "leaves_cloud"}
             ends = ends_of(truth["cylinders"][end["cylinder"]])
             assert np.linalg.norm(ends - end["point"], axis=1).min() < 1e-9
 
