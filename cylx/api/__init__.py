@@ -194,7 +194,8 @@ def evaluate(
 
     A pair is admissible if its errors (see `cylx.evaluation.Match`) are all below the given limits. Among the
     admissible pairs as many as possible are matched, at the least sum of errors over limits. True cylinders marked
-    `ignore` need not be found.
+    `ignore` need not be found. If both list `fittings` and `runs`, as the truth of `cylx.synthetic.piping` does, these
+    are scored, too (see `cylx.evaluation.FittingScores` and `cylx.evaluation.RunScore`).
 
     Parameters
     ----------

@@ -88,7 +88,7 @@ class TrueRun:
     length : float
         Along the centre line, branches included from the axis they start at; scene units.
     open_ends : tuple of (int, ndarray of shape (3,), str)
-        Straight, place and reason: `nothing there` or `leaves the cloud`.
+        Straight, place and reason: `nothing_there` or `leaves_cloud`.
     """
 
     cylinders: tuple[int, ...]

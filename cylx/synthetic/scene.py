@@ -96,11 +96,10 @@ class SyntheticScene:
 
     def truth(self) -> dict[str, object]:
         """Return the truth as a JSON object: lengths in scene units, angles in degrees."""
-        piping = {
-            name: [true.entry(i) for i, true in enumerate(listed)]
-            for name, listed in (("fittings", self.fittings), ("runs", self.runs))
-            if listed is not None
-        }
+        piping: dict[str, object] = {}
+        if self.fittings is not None and self.runs is not None:
+            piping["fittings"] = [fitting.entry(i) for i, fitting in enumerate(self.fittings)]
+            piping["runs"] = [run.entry(i) for i, run in enumerate(self.runs)]
         return {
             "family": self.family,
             "seed": self.seed,
@@ -129,10 +128,6 @@ class SyntheticScene:
         shift = np.array(offset, dtype=np.float64)
         demand(0 < scale < np.inf, "scale", f"must be > 0, not {scale}")
         demand(shift.shape == (3,) and bool(np.isfinite(shift).all()), "offset", "must be three finite numbers")
-        moved = {
-            name: None if listed is None else tuple(true.moved(shift, scale) for true in listed)
-            for name, listed in (("fittings", self.fittings), ("runs", self.runs))
-        }
         params = {
             **self.params,
             "scale": float(scale) * self.params.get("scale", 1.0),
@@ -144,7 +139,8 @@ class SyntheticScene:
             cylinders=tuple(true.moved(shift, scale) for true in self.cylinders),
             sigma=scale * self.sigma,
             params=params,
-            **moved,
+            fittings=None if self.fittings is None else tuple(one.moved(shift, scale) for one in self.fittings),
+            runs=None if self.runs is None else tuple(run.moved(shift, scale) for run in self.runs),
         )
 
 

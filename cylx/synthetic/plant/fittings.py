@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import axis_basis
 from cylx.synthetic.plant.network import Joining, Span, Straight
 from cylx.synthetic.plant.sizes import PipeSize
 from cylx.synthetic.plant.surfaces import Bend, Block, PipingSurface, Revolved, Ring, pipe
-from cylx.geometry.cylinder import axis_basis
 
 GASKET = 0.003
 """Between the discs of a pair of flanges, metres."""
@@ -102,7 +102,7 @@ def _flange(run: int, straight: int, low: FloatArray, high: FloatArray, size: Pi
     }
     surfaces: list[PipingSurface] = []
     depth = 0.5 * (thickness - GASKET) if pair else thickness
-    for inner in ((low, high - depth * axis) if pair else (low,)):
+    for inner in (low, high - depth * axis) if pair else (low,):
         surfaces.append(pipe(inner, inner + depth * axis, size.flange_radius))
     surfaces.append(Ring(low, -axis, size.radius, size.flange_radius))
     surfaces.append(Ring(high, axis, size.radius, size.flange_radius))
@@ -159,13 +159,17 @@ def _inline(rng: np.random.Generator, index: int, straight: Straight, span: Span
     disc = 2 * size.flange_thickness + GASKET
     low, high = straight.at(span.low), straight.at(span.high)
     between, middle = span.high - span.low - 2 * disc, 0.5 * (low + high)
-    wide = float(rng.uniform(0.75, 0.95)) * size.flange_radius
+    least = 1.04 * size.radius  # the pipe is inside
+    wide = max(float(rng.uniform(0.75, 0.95)) * size.flange_radius, 1.1 * size.radius)
     body: PipingSurface
     if rng.random() < 0.5:
         turn = np.column_stack([axis, *axis_basis(axis)])
-        body = Block(middle, np.array([between, 1.4 * wide, 1.4 * wide]), turn)
+        side = 2 * max(0.7 * wide, least)
+        body = Block(middle, np.array([between, side, side]), turn)
     else:
-        body = Revolved(middle, axis, -0.5 * between, 0.5 * between, wide, bulge=(wide / (0.6 * between)) ** 2)
+        body = Revolved(
+            middle, axis, -0.5 * between, 0.5 * between, wide, bulge=(wide**2 - least**2) / (0.5 * between) ** 2
+        )
     geometry = {
         "center": middle,
         "axis": axis,

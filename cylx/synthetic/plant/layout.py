@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from cylx.synthetic.plant.space import CLEARANCE, Space
 from cylx.synthetic.plant.surfaces import Revolved
 
 _RUN_ATTEMPTS, _ATTEMPTS, _BRANCH_ATTEMPTS = 400, 24, 24
-_FEWEST_STRAIGHTS = 3
+_FEWEST_STRAIGHTS, _MOST_STRAIGHTS = 3, 10  # of a run; one that has more gets no further branches
 _ODD_ANGLES = (15.0, 22.5, 30.0, 60.0, 75.0)
 _BENDS, _BEND_SHARES = (1.0, 1.5, 2.0, 3.0, 5.0), (0.15, 0.45, 0.1, 0.2, 0.1)
 """Bend radii in nominal diameters."""
@@ -63,7 +64,7 @@ class Layout:
         self._parts = 0
         self._connectors = Deck(rng, {"elbow 90": 9, "elbow 45": 4, "elbow odd": 2, "reducer": 4})
         plain = {"plain": 7, "flange": 4, "inline": 2, "gap": 2}
-        self._features = Deck(rng, {**plain, "insulation": 2, "tee": 5, "cross": 2})
+        self._features = Deck(rng, {**plain, "insulation": 2, "tee": 3, "cross": 1})
         self._line_ends = Deck(rng, {"cap": 3, "open": 3, "flange": 2})
 
     def build(self, runs: int) -> None:
@@ -106,18 +107,22 @@ class Layout:
         if last is None or len(self.straights) - first < _FEWEST_STRAIGHTS:
             return self._back(mark)
         lines = [last]
-        for index in range(first, len(self.straights)):
-            lines += self._branches(run, index)
+        index = first
+        while index < len(self.straights):  # those of branches, too
+            lines += self._branches(run, index, full=len(self.straights) - first > _MOST_STRAIGHTS)
+            index += 1
         for line in lines:
             self._end(run, line, backwards=False)
         head = self.straights[first]
         if through_wall:
-            self.ends.append(OpenEnd(run, first, head.start, "leaves the cloud"))
+            self.ends.append(OpenEnd(run, first, head.start, "leaves_cloud"))
         else:
             self._end(run, Cursor(head.start, -head.direction, head.size, first, (self._first_part,)), backwards=True)
         return True
 
-    def _line(self, run: int, cursor: Cursor, sections: int, from_wall: bool = False, root: float = 0.0) -> Cursor | None:
+    def _line(
+        self, run: int, cursor: Cursor, sections: int, from_wall: bool = False, root: float = 0.0
+    ) -> Cursor | None:
         """Add a line of straights with elbows and reducers between them, as far as there is space."""
         at = self._straight(run, cursor, from_wall, root)
         if at is None:
@@ -208,7 +213,9 @@ class Layout:
             others = [one for one in (index - 2, index - 1, index + 1) if 0 <= one < len(SIZES)]
             size = SIZES[others[self.rng.integers(len(others))]]
             aside = self._aside(cursor.direction, across=False) if self.rng.random() < 0.45 else None
-            joining, nodes = built_reducer(run, cursor.straight, following, cursor.point, cursor.direction, cursor.size, size, aside)
+            joining, nodes = built_reducer(
+                run, cursor.straight, following, cursor.point, cursor.direction, cursor.size, size, aside
+            )
             direction, radius = cursor.direction, max(size.radius, cursor.size.radius)
         else:
             angle_deg = {"elbow 90": 90.0, "elbow 45": 45.0}.get(card) or float(self.rng.choice(_ODD_ANGLES))
@@ -219,7 +226,7 @@ class Layout:
             )  # fmt: skip
             joining.missing = bool(self.rng.random() < 0.04)
             size, radius = cursor.size, cursor.size.radius
-        for a, b in zip(nodes[:-1], nodes[1:], strict=True):
+        for a, b in pairwise(nodes):
             if not (self.space.inside(a, b, radius) and self.space.free(a, b, radius, (*cursor.parts, part))):
                 return None
             self.space.add(a, b, radius, part)
@@ -237,14 +244,15 @@ class Layout:
             chosen = int(self.rng.choice(np.flatnonzero(lengths > 0.3)))
         return np.asarray(leaning[chosen] / lengths[chosen])
 
-    def _branches(self, run: int, index: int) -> list[Cursor]:
-        """Add the branches of a straight where there is space; return where they end."""
+    def _branches(self, run: int, index: int, *, full: bool) -> list[Cursor]:
+        """Add the branches of a straight where there is space, unless the run is full; return where they end."""
         straight, found = self.straights[index], []
         for span in [one for one in straight.spans if one.kind in {"tee", "cross"}]:
-            lines = next(filter(None, (self._branch(run, index, span) for _ in range(_BRANCH_ATTEMPTS))), None)
+            attempts = range(0 if full else _BRANCH_ATTEMPTS)
+            lines = next(filter(None, (self._branch(run, index, span) for _ in attempts)), None)
             if lines is None:
                 straight.spans.remove(span)
-                self._features.give_back([span.kind])
+                self._features.give_back([] if full else [span.kind])
             found += lines or []
         return found
 
@@ -277,7 +285,9 @@ class Layout:
         (card,) = self._line_ends.look()
         self._line_ends.take()
         straight, radius = self.straights[cursor.straight], cursor.size.radius
-        if card == "cap" and self.space.free(cursor.point, cursor.point + 0.5 * radius * cursor.direction, radius, cursor.parts):
+        if card == "cap" and self.space.free(
+            cursor.point, cursor.point + 0.5 * radius * cursor.direction, radius, cursor.parts
+        ):
             self.joinings.append(built_cap(run, cursor.straight, cursor.point, cursor.direction, radius))
             self.space.add(cursor.point, cursor.point + 0.5 * radius * cursor.direction, radius, cursor.parts[-1])
             return
@@ -289,4 +299,4 @@ class Layout:
             straight.spans.append(Span("flange", *ends))
             self.joinings.append(built_flange(run, cursor.straight, inner, cursor.point, cursor.size))
             self.space.add(inner, cursor.point, disc, cursor.parts[-1])
-        self.ends.append(OpenEnd(run, cursor.straight, cursor.point, "nothing there"))
+        self.ends.append(OpenEnd(run, cursor.straight, cursor.point, "nothing_there"))

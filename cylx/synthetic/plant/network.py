@@ -1,4 +1,4 @@
-"""What a plant is made of: straights with what sits on them, the fittings that join them, and the decks they come from."""
+"""What a plant is made of: straights, what sits on them, the fittings that join them, and the decks of cards."""
 
 from __future__ import annotations
 

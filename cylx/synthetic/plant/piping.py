@@ -78,8 +78,8 @@ def piping(
     demand(0 <= sigma < np.inf, "sigma", f"must be >= 0, not {sigma}")
     demand(seed >= 0, "seed", f"must be >= 0, not {seed}")
     rng = np.random.default_rng(seed)
-    size = _ROOM * max(1.0, runs / _RUNS_A_ROOM) ** (1 / 3)
-    views = _views(size)[:scanners]
+    size = room_size(runs)
+    views = scanner_places(size)[:scanners]
     layout = Layout(rng, Space(size, views, _BERTH))
     layout.build(runs)
     items, shapes = _items(rng, layout, size, planes)
@@ -105,8 +105,13 @@ def piping(
     )
 
 
-def _views(size: FloatArray) -> FloatArray:
-    """Return places for scanners: the corners, then the middles of the sides; shape (8, 3)."""
+def room_size(runs: int) -> FloatArray:
+    """Return the corner of the room opposite to the origin, metres; shape (3,)."""
+    return np.asarray(_ROOM * max(1.0, runs / _RUNS_A_ROOM) ** (1 / 3))
+
+
+def scanner_places(size: FloatArray) -> FloatArray:
+    """Return the places of scanners in a room, metres: its corners, then the middles of its sides; shape (8, 3)."""
     (x, y, _), inset = size, 0.4
     sides = [(0, 0), (1, 1), (1, 0), (0, 1), (0.5, 0), (0.5, 1), (0, 0.5), (1, 0.5)]
     return np.array([(inset + (x - 2 * inset) * a, inset + (y - 2 * inset) * b, 1.7) for a, b in sides])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +114,7 @@ def _batch(
     seen &= ~np.repeat([item.missing for item in items], counts)
     by_cylinder = np.argsort(cylinders, kind="stable")
     bounds = np.searchsorted(cylinders[by_cylinder], np.arange(len(layout.straights) + 1))
-    own = [by_cylinder[low:high] for low, high in zip(bounds[:-1], bounds[1:], strict=True)]
+    own = [by_cylinder[low:high] for low, high in pairwise(bounds)]
     for index, straight in enumerate(layout.straights):
         _leave_gaps(straight, points, own[index], seen)
     for index, joining in enumerate(layout.joinings):

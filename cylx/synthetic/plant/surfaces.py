@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -209,7 +210,7 @@ class Bend:
     def solids(self) -> FloatArray:
         """Return a chain of short cylinders along the centre line; shape (S, SOLID_NUMBERS)."""
         nodes = self.at(np.linspace(0, self.angle, 1 + math.ceil(self.angle / _STEP_OF_BENDS)))[0]
-        return np.concatenate([pipe(a, b, self.radius).solids() for a, b in zip(nodes[:-1], nodes[1:], strict=True)])
+        return np.concatenate([pipe(a, b, self.radius).solids() for a, b in pairwise(nodes)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -112,7 +112,7 @@ def _meets_revolved(row: FloatArray, x: float, y: float, z: float, u: float, v: 
     if a <= 0.0:
         return False
     lowest = -b / a
-    return first < lowest < last and c - b * b / a <= 0.0
+    return bool(first < lowest < last and c - b * b / a <= 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -141,7 +141,9 @@ def _meets_block(row: FloatArray, x: float, y: float, z: float, u: float, v: flo
 
 @njit(cache=True, nogil=True)
 def _meets(row: FloatArray, x: float, y: float, z: float, u: float, v: float, w: float) -> bool:
-    return _meets_block(row, x, y, z, u, v, w) if row[0] == BLOCK else _meets_revolved(row, x, y, z, u, v, w)
+    if row[0] == BLOCK:
+        return _meets_block(row, x, y, z, u, v, w)
+    return _meets_revolved(row, x, y, z, u, v, w)
 
 
 @njit(cache=True, nogil=True)
@@ -168,9 +170,7 @@ def _look(
             continue
         high = np.arcsin(min(1.0, max(-1.0, -w / far))) / np.pi + 0.5
         turned = np.arctan2(-v, -u) / (2.0 * np.pi) + 0.5
-        cell = (
-            min(_ELEVATIONS - 1, int(_ELEVATIONS * high)) * _AZIMUTHS + min(_AZIMUTHS - 1, int(_AZIMUTHS * turned))
-        )
+        cell = min(_ELEVATIONS - 1, int(_ELEVATIONS * high)) * _AZIMUTHS + min(_AZIMUTHS - 1, int(_AZIMUTHS * turned))
         hidden = False
         for k in range(offsets[cell], offsets[cell + 1]):
             row = solids[members[k]]
