@@ -48,7 +48,7 @@ def refined(
     points: FloatArray,
     spread: float,
     steps: int = 8,
-    beyond: float = 0.0,
+    says: tuple[float, float] = (0.0, 0.0),
 ) -> Solved:
     """Fit bend radius, tube radius and both axes to the points of the bend, with what is known of the pipes as priors.
 
@@ -65,8 +65,8 @@ def refined(
         Standard deviation of points about a surface.
     steps : int
         Gauss-Newton steps.
-    beyond : float
-        Up to how far behind the arc points of the second pipe have a full say: that of one that was not fitted yet.
+    says : pair of float
+        Up to how far from the arc points of either pipe have a full say: of one whose axis is hardly known.
     """
     ends: tuple[End, End] = (
         "end" if float(bend.first @ one.direction) > 0 else "start",
@@ -94,7 +94,7 @@ def refined(
         along, errors, skew = residuals(state)
         length = max(state[9], 0.0) * bend.angle
         # points of the straights are in their priors already
-        beside = np.maximum(np.maximum(-along, along - length - beyond), 0.0)
+        beside = np.maximum(np.maximum(-along - says[0], along - length - says[1]), 0.0)
         weights = np.maximum(1.0 - (errors / (ON_SURFACE * 1.5 * spread)) ** 2, 0.0) ** 2
         weights *= np.where(beside > 2.0 * radius, 0.0, np.where(beside > 0.0, 0.25, 1.0)) / spread**2
         jacobian, bending = np.empty((len(points), 10)), np.empty((3, 10))

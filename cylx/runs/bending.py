@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +27,14 @@ OVERSHOOT = 1.5
 MOST_POINTS = 1500
 TRIED = 28
 """Bend radii that are tried before the fit."""
+LOOSE = 0.02
+"""Standard deviation of a tilt from which the axis of a pipe is hardly known, radians."""
+SAY = 0.8
+"""Share of a pipe whose points say together with those of a bend how its axis lies, if that is hardly known."""
+NEARBY = 3.0
+"""Bends that begin within so many radii of the ends of their pipes come first."""
+SHARPEST = math.radians(100.0)
+"""Mitres of a greater angle are none."""
 BINS = 8
 """Pieces of the arc, at most, that are asked for points."""
 LEAST_INLIERS = 10
@@ -141,26 +149,27 @@ def _meeting(one: Pipe, end: End, two: Pipe, other: End) -> tuple[Bend, tuple[fl
     return Bend(0.5 * (feet[0] + feet[1]), first, second, 0.0), ahead
 
 
-def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> FittedBend | None:
+def fit_meeting(meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings) -> FittedBend | None:
     """Fit the bend of two ends to the points about it; None if it does not fit.
 
     Parameters
     ----------
     meeting : Meeting
-    pipes : list of Pipe
+    pipes : sequence of Pipe
+        Those it is of.
     near : Surroundings
 
     Returns
     -------
     FittedBend or None
     """
-    one, two = (pipes[i] for i in meeting.pipes)
+    one, two = pipes
     radius, spread = 0.5 * (one.radius + two.radius), max(one.spread, two.spread)
     slope = math.tan(0.5 * meeting.bend.angle)
     room = min(meeting.ahead[0] + 0.9 * one.length, meeting.ahead[1] + 0.9 * two.length)
     most = min(room / slope, WIDEST_BEND * radius)
     if near.cells is None:
-        return _by_axes(meeting, pipes, slope)
+        return _by_axes(meeting, one, two, slope)
     if most <= 0:
         return None
     reach = most * slope + 2.0 * radius
@@ -177,18 +186,54 @@ def fit_meeting(meeting: Meeting, pipes: list[Pipe], near: Surroundings) -> Fitt
     bend = replace(meeting.bend, bend_radius=float(fine[costs.argmin()]))
     _, distances = bend.coordinates(points)
     about = points[np.abs(distances - radius) < max(0.3 * radius, 2.0 * ON_SURFACE * spread)]
-    solved = refined(bend, one, two, radius, about, spread)
-    return judged(meeting.pipes, meeting.ends, solved, indices, near, spread)
+    says = SAY * one.length if is_loose(one) else 0.0, SAY * two.length if is_loose(two) else 0.0
+    solved = refined(bend, one, two, radius, about, spread, says=says)
+    found = judged(meeting.pipes, meeting.ends, solved, indices, near, spread)
+    return None if found is None or _is_across(found, one, two, near) else found
 
 
-def _by_axes(meeting: Meeting, pipes: list[Pipe], slope: float) -> FittedBend | None:
+def _is_across(found: FittedBend, one: Pipe, two: Pipe, near: Surroundings) -> bool:
+    """Return whether other pipes are between the ends of two pipes and their bend, or it turns back with no radius."""
+    if found.bend.bend_radius < 0.2 * found.radius and found.bend.angle > SHARPEST:
+        return True
+    for pipe, end, place in ((one, found.ends[0], found.bend.start), (two, found.ends[1], found.bend.end)):
+        axis = pipe.outward(end)
+        gap = float((place - pipe.at(end)) @ axis)
+        if gap > NEARBY * pipe.radius:
+            reach = ON_SURFACE * pipe.spread
+            inner = max(0.0, pipe.radius - reach)
+            tube = near.about(
+                pipe.at(end), axis, 0.5 * pipe.radius, gap - 0.5 * pipe.radius, pipe.radius + reach, inner
+            )
+            foreign = ~near.free(tube, (one.label, two.label))
+            if foreign.sum() > 0.5 * len(tube):
+                return True
+    return False
+
+
+def is_loose(pipe: Pipe) -> bool:
+    """Return whether the axis of a pipe is so uncertain that the points of a bend have to tell it."""
+    return float(np.trace(pipe.covariance[2:4, 2:4])) > LOOSE**2
+
+
+def gap_before(one: FittedBend, pipes: Sequence[Pipe]) -> float:
+    """Return how far the ends of two pipes are from the bend between them, together."""
+    places = one.bend.start, one.bend.end
+    gaps = (
+        float((place - pipes[i].at(end)) @ pipes[i].outward(end))
+        for i, end, place in zip(one.pipes, one.ends, places, strict=True)
+    )
+    return sum(max(gap, 0.0) for gap in gaps)
+
+
+def _by_axes(meeting: Meeting, one: Pipe, two: Pipe, slope: float) -> FittedBend | None:
     """Return the bend that begins at the nearer of two ends: all that is known without points."""
-    radius = 0.5 * sum(pipes[i].radius for i in meeting.pipes)
+    radius = 0.5 * (one.radius + two.radius)
     bend_radius = max(min(meeting.ahead), 0.0) / slope
     if bend_radius > WIDEST_BEND * radius:
         return None
     bend, none = replace(meeting.bend, bend_radius=bend_radius), np.empty(0, np.int64)
-    known = np.stack([pipes[i].covariance[:4, :4] for i in meeting.pipes])
+    known = np.stack([pipe.covariance[:4, :4] for pipe in (one, two)])
     return FittedBend(meeting.pipes, meeting.ends, bend, radius, none, 0.0, 0.0, 0.0, 0.0, {}, np.zeros((2, 4)), known)
 
 

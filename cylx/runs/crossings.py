@@ -57,7 +57,7 @@ def _crossed(pipes: Sequence[Pipe], k: int) -> tuple[Pipe, tuple[FloatArray, flo
         if float(np.linalg.norm(feet[0] - feet[1])) > BESIDE * main.radius:
             continue
         inside = abs(float((feet[0] - pipe.middle) @ pipe.direction)) < 0.5 * pipe.length - 2.0 * main.radius / sine
-        on = abs(float((feet[1] - main.middle) @ main.direction)) < 0.5 * main.length - 0.3 * pipe.radius
+        on = abs(float((feet[1] - main.middle) @ main.direction)) < 0.5 * main.length - 1.5 * pipe.radius
         if inside and on:
             return main, (feet[0], sine)
     return None

@@ -102,7 +102,7 @@ def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surrounding
     _, distances = bend.coordinates(points)
     width = max(SHELL * radius, 2.0 * ON_SURFACE * pipe.spread)
     about = points[np.abs(distances - radius) < width]
-    solved = refined(bend, pipe, loose, radius, about[:: max(1, len(about) // 1500)], pipe.spread, 12, length)
+    solved = refined(bend, pipe, loose, radius, about[:: max(1, len(about) // 1500)], pipe.spread, 12, (0.0, length))
     bend = solved.bend
     if bend.angle < LEAST_TURN or bend.bend_radius > 1.2 * RADII[-1] * radius:
         return None

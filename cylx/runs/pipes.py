@@ -229,3 +229,13 @@ def tilted(pipe: Pipe, change: FloatArray) -> tuple[FloatArray, FloatArray]:
     direction = pipe.direction + change[2] * first + change[3] * second
     middle = pipe.middle + change[0] * first + change[1] * second
     return middle, direction / math.sqrt(float(direction @ direction))
+
+
+def axis_change(pipe: Pipe, other: Pipe, change: FloatArray) -> FloatArray:
+    """Return the offsets and tilts that bring a pipe to where another, of about the same axis, is after its own."""
+    middle, direction = tilted(other, change)
+    first, second = axis_basis(pipe.direction)
+    along = float((pipe.middle - middle) @ direction)
+    away = middle + along * direction - pipe.middle
+    slope = direction / float(direction @ pipe.direction)
+    return np.array([away @ first, away @ second, slope @ first, slope @ second])

@@ -10,16 +10,18 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import canonical_direction
 from cylx.records import Cap, Cross, Elbow, Fitting, Flange, Inline, Joint, Junction, Reducer
-from cylx.runs.bending import FittedBend, fit_meeting, meetings
+from cylx.runs.bending import NEARBY, FittedBend, Meeting, fit_meeting, gap_before, is_loose, meetings
 from cylx.runs.collars import Collar, collars_of
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
 from cylx.runs.pieces import refit
-from cylx.runs.pipes import ENDS, End, Pipe, Surroundings, tilted
+from cylx.runs.pipes import ENDS, End, Pipe, Surroundings, axis_change, tilted
 from cylx.runs.wider import wider_ones
 
 CROSSING = 0.5
 """Branches that face each other meet the main within so many of its radii of each other."""
+SHORT, LOOSE_OFFSET, LOOSE_TILT = 4.0, 0.1, 0.05
+"""The axis of a pipe shorter than so many radii is taken for uncertain by so many radii, and radians."""
 AGAIN = 0.2
 """A pipe that lost so many radii of its length to fittings is fitted again without what it lost."""
 BY_AXES = 0.5
@@ -89,14 +91,52 @@ def trust(inliers: int, lengthwise: float, wrong: float = 0.0) -> float:
 
 def add_bends(trace: Trace, near: Surroundings) -> int:
     """Add the elbows between pipes whose axes meet; return their number."""
-    tried = (fit_meeting(meeting, trace.pipes, near) for meeting in meetings(trace.pipes, trace.closed))
-    found = sorted((one for one in tried if one is not None), key=lambda one: (-one.lengthwise, -len(one.indices)))
-    count = 0
-    for one in found:
-        if trace.is_free(zip(one.pipes, one.ends, strict=True)):
-            add_bend(trace, one)
-            count += 1
-    return count
+    tried = []
+    for meeting in meetings(trace.pipes, trace.closed):
+        fitted = fit_meeting(meeting, [trace.pipes[i] for i in meeting.pipes], near)
+        if fitted is not None:
+            gap = gap_before(fitted, trace.pipes) / fitted.radius
+            tried.append(((gap > NEARBY, -fitted.lengthwise, -len(fitted.indices), meeting.pipes), meeting, fitted))
+    accepted: list[tuple[Meeting, FittedBend]] = []
+    ends: set[tuple[int, End]] = set()
+    for _, meeting, fitted in sorted(tried, key=lambda one: one[0]):
+        keys = set(zip(fitted.pipes, fitted.ends, strict=True))
+        if not keys & ends:
+            ends |= keys
+            accepted.append((meeting, fitted))
+    for one in _together(accepted, trace.pipes, near):
+        add_bend(trace, one)
+    return len(accepted)
+
+
+def _together(found: list[tuple[Meeting, FittedBend]], pipes: list[Pipe], near: Surroundings) -> list[FittedBend]:
+    """Return bends fitted again where a pipe is short between two of them: each knows what the other says of it."""
+    said: dict[int, list[tuple[int, Pipe]]] = {}
+    for number, (_, fitted) in enumerate(found):
+        for k, index in enumerate(fitted.pipes):
+            if is_loose(pipes[index]):
+                told = moved_axis(pipes[index], fitted.shifts[k], fitted.covariances[k])
+                said.setdefault(index, []).append((number, told))
+    out = []
+    for number, (meeting, fitted) in enumerate(found):
+        known = [
+            next((pipe for other, pipe in said.get(index, []) if other != number), pipes[index])
+            for index in fitted.pipes
+        ]
+        changed = any(pipe is not pipes[index] for pipe, index in zip(known, fitted.pipes, strict=True))
+        again = fit_meeting(meeting, known, near) if changed else None
+        if again is None:
+            out.append(fitted)
+            continue
+        # what it says of the pipes is told from where they are now
+        shifts = np.array(
+            [
+                axis_change(pipes[index], pipe, change)
+                for index, pipe, change in zip(fitted.pipes, known, again.shifts, strict=True)
+            ]
+        )
+        out.append(replace(again, shifts=shifts))
+    return out
 
 
 def trim(trace: Trace, near: Surroundings) -> list[Pipe]:
@@ -107,8 +147,16 @@ def trim(trace: Trace, near: Surroundings) -> list[Pipe]:
         near.release(pipe)
         lost = trace.starts[k].length - pipe.length if k < len(trace.starts) else 0.0
         fitted = refit(pipe, near.points[near.on(pipe)]) if lost > AGAIN * pipe.radius else None
-        out.append(pipe if fitted is None else fitted)
+        out.append(_loosened(fitted or pipe))
     return out
+
+
+def _loosened(pipe: Pipe) -> Pipe:
+    """Return a pipe that is short with an axis that is hardly known: its ends may be of the fittings beside it."""
+    if pipe.length > SHORT * pipe.radius:
+        return pipe
+    offset, tilt = (LOOSE_OFFSET * pipe.radius) ** 2, LOOSE_TILT**2
+    return replace(pipe, covariance=pipe.covariance + np.diag([offset, offset, tilt, tilt, 0.0]))
 
 
 def add_bend(trace: Trace, one: FittedBend) -> None:
@@ -140,6 +188,11 @@ def with_axis(pipe: Pipe, change: FloatArray, covariance: FloatArray) -> Pipe:
     """Return a pipe after a fit with its neighbour, if the fit knows its axis clearly better than before."""
     if float(np.trace(covariance[2:4, 2:4])) > BETTER**2 * float(np.trace(pipe.covariance[2:4, 2:4])):
         return pipe
+    return moved_axis(pipe, change, covariance)
+
+
+def moved_axis(pipe: Pipe, change: FloatArray, covariance: FloatArray) -> Pipe:
+    """Return a pipe with its axis moved by offsets and tilts, and the covariance of these."""
     middle, direction = tilted(pipe, change)
     if float(canonical_direction(direction) @ direction) < 0:  # its ends, and its covariance, go by the sign
         return pipe
