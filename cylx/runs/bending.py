@@ -41,7 +41,9 @@ LEAST_INLIERS = 10
 LEAST_LENGTHWISE = 0.5
 """Share of the pieces of the arc that must hold points."""
 MOST_INSIDE = 0.5
-"""More points inside than on the surface are none of a pipe."""
+"""Points inside the tube, or just beside its surface, for each point on it."""
+BESIDE = 0.3
+"""Points within so many radii of the surface are just beside it."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -284,7 +286,8 @@ def judged(
     inside = on_arc & (errors < -width - 0.1 * radius)
     own = on_arc & (np.abs(errors) < width)
     count = int(own.sum())
-    if count < LEAST_INLIERS or inside.sum() > MOST_INSIDE * count:
+    beside = on_arc & (np.abs(errors) >= width) & (np.abs(errors) < max(BESIDE * radius, 2.0 * width))
+    if count < LEAST_INLIERS or inside.sum() > MOST_INSIDE * count or beside.sum() > MOST_INSIDE * count:
         return None
     length = bend.length + 2.0 * margin
     pieces = int(np.clip(length / max(2.0 * near.spacing, 1e-12), 1, BINS))

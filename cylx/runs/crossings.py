@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,8 +14,8 @@ from cylx.runs.pipes import Pipe, Surroundings
 
 CROSSING = math.radians(25.0)
 """Axes at a smaller angle do not cross."""
-THROUGH = 1.08
-"""Radius of a pipe that goes through another, in the radius of that."""
+EQUAL = 0.95
+"""Pipes of about one radius that cross stay as they are: nobody can tell which of them goes through."""
 BESIDE = 0.3
 """Axes that cross meet within so many radii of the other."""
 
@@ -46,18 +46,35 @@ def _crossed(pipes: Sequence[Pipe], k: int) -> tuple[Pipe, tuple[FloatArray, flo
     """Return the pipe that a pipe goes through, where, and the sine of the angle between them; None for none."""
     pipe = pipes[k]
     for j, main in enumerate(pipes):
-        if j == k or pipe.radius > THROUGH * main.radius:
+        if j == k or pipe.radius > EQUAL * main.radius:
             continue
-        if pipe.radius > 0.95 * main.radius and (pipe.length, k) > (main.length, j):
-            continue
-        sine = float(np.linalg.norm(np.cross(pipe.direction, main.direction)))
-        if sine < math.sin(CROSSING):
-            continue
-        feet = common_perpendicular(pipe.middle, pipe.direction, main.middle, main.direction)[:2]
-        if float(np.linalg.norm(feet[0] - feet[1])) > BESIDE * main.radius:
-            continue
-        inside = abs(float((feet[0] - pipe.middle) @ pipe.direction)) < 0.5 * pipe.length - 2.0 * main.radius / sine
-        on = abs(float((feet[1] - main.middle) @ main.direction)) < 0.5 * main.length - 1.5 * pipe.radius
-        if inside and on:
-            return main, (feet[0], sine)
+        found = crossing_of(pipe, main)
+        if found is not None:
+            return main, found
     return None
+
+
+def crossing_of(pipe: Pipe, main: Pipe) -> tuple[FloatArray, float] | None:
+    """Return where a pipe goes through another, on its axis, and the sine of the angle; None if it does not."""
+    sine = float(np.linalg.norm(np.cross(pipe.direction, main.direction)))
+    if sine < math.sin(CROSSING):
+        return None
+    feet = common_perpendicular(pipe.middle, pipe.direction, main.middle, main.direction)[:2]
+    if float(np.linalg.norm(feet[0] - feet[1])) > BESIDE * main.radius:
+        return None
+    inside = abs(float((feet[0] - pipe.middle) @ pipe.direction)) < 0.5 * pipe.length - 2.0 * main.radius / sine
+    on = abs(float((feet[1] - main.middle) @ main.direction)) < 0.5 * main.length - 1.5 * pipe.radius
+    return (feet[1], sine) if inside and on else None
+
+
+def equal_crossings(pipes: Sequence[Pipe], aside: set[int]) -> Iterator[tuple[int, int, FloatArray, float]]:
+    """Yield the pairs of pipes of about one radius that go through each other, where, and the sine of the angle."""
+    for k, pipe in enumerate(pipes):
+        for j in range(k):
+            main = pipes[j]
+            equal = min(pipe.radius, main.radius) > EQUAL * max(pipe.radius, main.radius)
+            if equal and not {j, k} & aside:
+                found = crossing_of(pipe, main)
+                if found is not None:
+                    first, second = (j, k) if main.length >= pipe.length else (k, j)
+                    yield first, second, *found

@@ -10,7 +10,7 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import Bend
-from cylx.runs.bend_fit import refined
+from cylx.runs.bend_fit import Solved, refined
 from cylx.runs.bending import FittedBend, judged
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
 from cylx.runs.tracing import Trace, add_bend
@@ -27,7 +27,9 @@ STEP = 0.25
 """Pieces of the centre line, in radii."""
 SHELL = 0.3
 """Points within so many radii of the surface, but not on it, speak against it."""
-MOST_POINTS = 600
+MOST_POINTS, MOST_IN_FIT = 600, 1500
+FIRST, SECOND = 8, 3
+"""How many bends are tried with several angles, and how many are fitted."""
 LEAST_AHEAD = 12
 """Free points just ahead of an end, without which nothing goes on there."""
 LEAST_SCORE = 25.0
@@ -92,23 +94,15 @@ def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surrounding
     if ahead.sum() < LEAST_AHEAD:
         return None
     some = points[:: max(1, len(points) // MOST_POINTS)]
-    start = _best_start(pipe, place, axis, some, len(points) / max(len(some), 1))
-    if start is None:
+    best: tuple[float, Solved, Pipe, float] | None = None
+    for bend in _starts(pipe, place, axis, some, len(points) / max(len(some), 1)):
+        found = _refined(pipe, bend, points, near)
+        if found is not None and (best is None or found[0] > best[0]):
+            best = found
+    if best is None or best[0] < LEAST_SCORE:
         return None
-    bend, _ = start
-    loose, length = _next_pipe(pipe, bend, points, near)
-    if loose is None:
-        return None
-    _, distances = bend.coordinates(points)
-    width = max(SHELL * radius, 2.0 * ON_SURFACE * pipe.spread)
-    about = points[np.abs(distances - radius) < width]
-    solved = refined(bend, pipe, loose, radius, about[:: max(1, len(about) // 1500)], pipe.spread, 12, (0.0, length))
+    _, solved, loose, length = best
     bend = solved.bend
-    if bend.angle < LEAST_TURN or bend.bend_radius > 1.2 * RADII[-1] * radius:
-        return None
-    length = _length_beyond(bend, radius, pipe.spread, points)
-    if length < LEAST_STRAIGHT * radius or _score(bend, radius, pipe.spread, points, length) < LEAST_SCORE:
-        return None
     first, last = turned(bend.end, bend.end + length * bend.second)
     joined: End = "start" if float((last - first) @ bend.second) > 0 else "end"
     covariance = loose.covariance.copy()
@@ -128,10 +122,29 @@ def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surrounding
     return found, replace(fitted, shifts=shifts)
 
 
-def _best_start(
-    pipe: Pipe, place: FloatArray, axis: FloatArray, points: FloatArray, weight: float
-) -> tuple[Bend, float] | None:
-    """Return the best of many bends that begin at an end of a pipe, and its score."""
+def _refined(
+    pipe: Pipe, bend: Bend, points: FloatArray, near: Surroundings
+) -> tuple[float, Solved, Pipe, float] | None:
+    """Fit a bend and the pipe behind it; return its score, the fit, that pipe before it, and its length."""
+    radius, spread = pipe.radius, pipe.spread
+    loose, length = _next_pipe(pipe, bend, points, near)
+    if loose is None:
+        return None
+    _, distances = bend.coordinates(points)
+    about = points[np.abs(distances - radius) < max(SHELL * radius, 2.0 * ON_SURFACE * spread)]
+    some = about[:: max(1, len(about) // MOST_IN_FIT)]
+    solved = refined(bend, pipe, loose, radius, some, spread, 12, (0.0, length))
+    bend = solved.bend
+    if bend.angle < LEAST_TURN or bend.bend_radius > 1.2 * RADII[-1] * radius:
+        return None
+    length = _length_beyond(bend, radius, spread, points)
+    if length < LEAST_STRAIGHT * radius:
+        return None
+    return _score(bend, radius, spread, points, length), solved, loose, length
+
+
+def _starts(pipe: Pipe, place: FloatArray, axis: FloatArray, points: FloatArray, weight: float) -> list[Bend]:
+    """Return the best of many bends that begin at an end of a pipe."""
     radius, spread = pipe.radius, pipe.spread
     first, second = axis_basis(axis)
     away = points - place
@@ -139,13 +152,13 @@ def _best_start(
     shell = max(SHELL * radius, 2.0 * ON_SURFACE * spread)
     ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * spread))
     pieces = int(AHEAD / STEP)
-    best: tuple[float, float, float, float, float] | None = None
+    found: list[tuple[float, float, float, float, float]] = []
     for turn in np.arange(TURNS) * (2.0 * math.pi / TURNS):
         inward, across = math.cos(turn) * a + math.sin(turn) * b, math.cos(turn) * b - math.sin(turn) * a
-        for before in BEFORE:
-            ahead = x - before * radius
-            for bend_radius in RADII:
-                size = bend_radius * radius
+        for bend_radius in RADII:
+            size, best = bend_radius * radius, (-math.inf, 0.0, 0.0)
+            for before in BEFORE:
+                ahead = x - before * radius
                 y = size - inward
                 along = size * np.arctan2(ahead, y)
                 errors = np.abs(np.hypot(np.hypot(ahead, y) - size, across) - radius)
@@ -154,21 +167,27 @@ def _best_start(
                 rows = np.minimum((along[counted] / (STEP * radius)).astype(np.int64), pieces - 1)
                 total = np.cumsum(np.bincount(rows, weights=gain, minlength=pieces))
                 most = int(total.argmax())
-                if best is None or total[most] > best[0]:
-                    best = (float(total[most]), turn, before, size, (most + 1) * STEP * radius / size)
-    if best is None or best[0] * weight < LEAST_SCORE:
-        return None
-    _, turn, before, size, angle = best
-    inward = math.cos(turn) * first + math.sin(turn) * second
-    start = place + before * radius * axis
-    tried = []
-    for some in np.unique(np.concatenate([np.linspace(0.35, 1.15, 9) * angle, [math.pi / 4.0, math.pi / 2.0]])):
-        onward = math.cos(some) * axis + math.sin(some) * inward
-        bend = Bend(start + size * math.tan(0.5 * some) * axis, axis, onward, size)
-        if LEAST_TURN <= some <= 0.9 * math.pi:
+                best = max(best, (float(total[most]), before, (most + 1) * STEP * radius / size))
+            found.append((best[0], float(turn), best[1], size, best[2]))
+    found.sort(reverse=True)
+    tried: list[tuple[float, float, float, Bend]] = []
+    for score, turn, before, size, angle in found[:FIRST]:
+        if score * weight < LEAST_SCORE:
+            break
+        inward = math.cos(turn) * first + math.sin(turn) * second
+        start = place + before * radius * axis
+        angles = np.concatenate([np.linspace(0.35, 1.15, 9) * angle, [math.pi / 4.0, math.pi / 2.0]])
+        best_of: tuple[float, float, float, Bend] | None = None
+        for some in angles[(angles >= LEAST_TURN) & (angles <= 0.9 * math.pi)]:
+            onward = math.cos(some) * axis + math.sin(some) * inward
+            bend = Bend(start + size * math.tan(0.5 * some) * axis, axis, onward, size)
             length = _length_beyond(bend, radius, spread, points)
-            tried.append((_score(bend, radius, spread, points, length), bend))
-    return None if not tried else max(tried, key=lambda one: one[0])[::-1]
+            one = (_score(bend, radius, spread, points, length), turn, size, bend)
+            best_of = one if best_of is None or one[0] > best_of[0] else best_of
+        if best_of is not None:
+            tried.append(best_of)
+    tried.sort(key=lambda one: -one[0])
+    return [one[3] for one in tried[:SECOND]]
 
 
 def _gains(bend: Bend, radius: float, spread: float, points: FloatArray) -> tuple[FloatArray, FloatArray]:

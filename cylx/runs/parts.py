@@ -8,8 +8,12 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Flange, Inline, Junction
+from cylx.runs.pipes import Pipe
 from cylx.runs.tracing import Trace
 from cylx.runs.wider import LONGEST_RIM
+
+LEAST_LEFT, LEAST_POINTS = 0.25, 6
+"""A pipe that was found along a run has a length of so many radii, and so many points, in the end."""
 
 
 def drop_parts(trace: Trace) -> Trace:
@@ -29,11 +33,12 @@ def drop_parts(trace: Trace) -> Trace:
                 inside = abs(along) + 0.4 * pipe.length < 0.5 * float(np.linalg.norm(high - low)) + 0.3 * reach
                 if inside and beside + pipe.radius < 1.15 * reach:
                     parts.add(k)
+    parts |= {k for k, pipe in enumerate(trace.pipes) if _is_remnant(pipe, trace)}
     kept = [k for k in range(len(trace.pipes)) if k not in parts]
     number = {old: new for new, old in enumerate(kept)}
     out = Trace([trace.pipes[k] for k in kept], trace.near)
     for fitting, points in zip(trace.fittings, trace.points, strict=True):
-        if fitting.joins[0] in parts:
+        if parts.intersection(fitting.joins):
             continue
         moved = replace(fitting, joins=tuple(number[k] for k in fitting.joins))
         if isinstance(moved, Junction):
@@ -41,6 +46,13 @@ def drop_parts(trace: Trace) -> Trace:
             moved = replace(moved, main=main, branches=branches)
         out.add(moved, points)
     return out
+
+
+def _is_remnant(pipe: Pipe, trace: Trace) -> bool:
+    """Return whether of a pipe that was found along a run hardly anything is left between its fittings."""
+    if pipe.source is not None:
+        return False
+    return pipe.length < LEAST_LEFT * pipe.radius or len(trace.near.on(pipe)) < LEAST_POINTS
 
 
 _OF_ONE = ("cap", "flange", "inline")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -12,12 +13,15 @@ from cylx.geometry.cylinder import canonical_direction
 from cylx.records import Cap, Cross, Elbow, Fitting, Flange, Inline, Joint, Junction, Reducer
 from cylx.runs.bending import NEARBY, FittedBend, Meeting, fit_meeting, gap_before, is_loose, meetings
 from cylx.runs.collars import Collar, collars_of
+from cylx.runs.crossings import equal_crossings
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
 from cylx.runs.pieces import refit
 from cylx.runs.pipes import ENDS, End, Pipe, Surroundings, axis_change, tilted
 from cylx.runs.wider import wider_ones
 
+THROUGH = 0.9
+"""Confidence of a cross of two pipes of one radius that go through each other."""
 CROSSING = 0.5
 """Branches that face each other meet the main within so many of its radii of each other."""
 SHORT, LOOSE_OFFSET, LOOSE_TILT = 4.0, 0.1, 0.05
@@ -264,6 +268,20 @@ def add_junctions(trace: Trace, near: Surroundings) -> int:
                 break
         _add_junction(trace, group, near)
         count += 1
+    known = {frozenset(one.joins) for one in trace.fittings if isinstance(one, Junction)}
+    for main, branch, center, sine in equal_crossings(trace.pipes, trace.aside):
+        if frozenset((main, branch)) not in known:
+            cross = Cross(
+                joins=(main, branch),
+                ends=("side", "side"),
+                confidence=THROUGH,
+                center=center,
+                main=(main,),
+                branches=(branch,),
+                angle=math.asin(min(sine, 1.0)),
+            )
+            trace.add(cross, np.empty(0, np.int64))
+            count += 1
     return count
 
 
