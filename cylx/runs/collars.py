@@ -154,10 +154,10 @@ def _short_things(ring: _Ring, pipe: Pipe, near: Surroundings) -> list[tuple[flo
     inner = ring.distances < WIDEST * pipe.radius
     np.add.at(grid, (ring.sectors[inner], rows[inner]), 1.0)
     reach = max(int(6.0 * pipe.radius / width), 8)
-    usual = np.empty_like(grid)
-    for k in range(count):
-        usual[:, k] = np.median(grid[:, max(0, k - reach) : k + reach + 1], axis=1)
-    active = (grid > ABOVE * usual).sum(axis=0) >= LEAST_SECTORS
+    active = np.zeros(count, np.bool_)
+    for k in np.flatnonzero((grid > 0).sum(axis=0) >= LEAST_SECTORS):
+        usual = np.median(grid[:, max(0, k - reach) : k + reach + 1], axis=1)
+        active[k] = (grid[:, k] > ABOVE * usual).sum() >= LEAST_SECTORS
     out: list[tuple[float, float]] = []
     bridge = max(2, int(0.35 * pipe.radius / width))
     last = -bridge - 2

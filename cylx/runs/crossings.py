@@ -56,7 +56,11 @@ def _crossed(pipes: Sequence[Pipe], k: int) -> tuple[Pipe, tuple[FloatArray, flo
 
 def crossing_of(pipe: Pipe, main: Pipe) -> tuple[FloatArray, float] | None:
     """Return where a pipe goes through another, on its axis, and the sine of the angle; None if it does not."""
-    sine = float(np.linalg.norm(np.cross(pipe.direction, main.direction)))
+    apart = pipe.middle - main.middle
+    if float(apart @ apart) > (0.5 * (pipe.length + main.length) + main.radius) ** 2:
+        return None
+    cosine = float(pipe.direction @ main.direction)
+    sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
     if sine < math.sin(CROSSING):
         return None
     feet = common_perpendicular(pipe.middle, pipe.direction, main.middle, main.direction)[:2]

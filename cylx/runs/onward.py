@@ -96,9 +96,9 @@ def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surrounding
     some = points[:: max(1, len(points) // MOST_POINTS)]
     best: tuple[float, Solved, Pipe, float] | None = None
     for bend in _starts(pipe, place, axis, some, len(points) / max(len(some), 1)):
-        found = _refined(pipe, bend, points, near)
-        if found is not None and (best is None or found[0] > best[0]):
-            best = found
+        one = _refined(pipe, bend, points, near)
+        if one is not None and (best is None or one[0] > best[0]):
+            best = one
     if best is None or best[0] < LEAST_SCORE:
         return None
     _, solved, loose, length = best

@@ -94,13 +94,11 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
     """Return the piece of a pipe that its points bear out, and the pieces that what is left of it is."""
     half = 0.5 * pipe.length
     indices = near.about(pipe.middle, pipe.direction, -half, half, (1.0 + 2.0 * SHELL) * pipe.radius)
-    away = pipe.middle - np.array([one.middle for one in others]).reshape(-1, 3)
-    beside = [
-        one.label
-        for one, apart in zip(others, away, strict=True)
-        if abs(float(one.direction @ pipe.direction)) > PARALLEL
-        and float(np.linalg.norm(apart - (apart @ pipe.direction) * pipe.direction)) < pipe.radius
-    ]
+    apart = pipe.middle - np.array([one.middle for one in others]).reshape(-1, 3)
+    turns = np.abs(np.array([one.direction for one in others]).reshape(-1, 3) @ pipe.direction)
+    square = np.einsum("ij,ij->i", apart, apart) - (apart @ pipe.direction) ** 2
+    parallel = np.flatnonzero((turns > PARALLEL) & (square < pipe.radius**2))
+    beside = [others[k].label for k in parallel.tolist()]
     of_others = np.isin(near.labels[indices], beside)
     used = near.free(indices, (pipe.label,)) | of_others
     indices, foreign = indices[used], of_others[used]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -45,6 +45,10 @@ class Pipe:
         What `Surroundings` calls its points.
     source : int or None
         Index of the cylinder that it was; None for one that was found along a run.
+    length : float
+        Length of its axis.
+    direction : ndarray of shape (3,)
+        Unit direction from start to end.
     """
 
     start: FloatArray
@@ -54,6 +58,14 @@ class Pipe:
     covariance: FloatArray
     label: int
     source: int | None = None
+    length: float = field(init=False)
+    direction: FloatArray = field(init=False)
+
+    def __post_init__(self) -> None:
+        along = self.end - self.start
+        length = math.sqrt(float(along @ along))
+        object.__setattr__(self, "length", length)
+        object.__setattr__(self, "direction", along / max(length, 1e-300))
 
     @classmethod
     def of(cls, index: int, fit: CylinderFit, origin: FloatArray, noise: float) -> Pipe:
@@ -66,19 +78,9 @@ class Pipe:
         return cls(shape.start - origin, shape.end - origin, shape.radius, spread, covariance, index, index)
 
     @property
-    def length(self) -> float:
-        """Length of its axis."""
-        return float(np.linalg.norm(self.end - self.start))
-
-    @property
     def middle(self) -> FloatArray:
         """Middle of its axis."""
         return 0.5 * (self.start + self.end)
-
-    @property
-    def direction(self) -> FloatArray:
-        """Unit direction from start to end."""
-        return (self.end - self.start) / max(self.length, 1e-300)
 
     def at(self, end: End) -> FloatArray:
         """Return the place of an end."""

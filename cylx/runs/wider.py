@@ -19,19 +19,20 @@ COVERED = 0.5
 
 def coaxial(index: int, pipes: Sequence[Pipe]) -> list[int]:
     """Return the wider pipes about the axis of a pipe."""
-    pipe, out = pipes[index], []
-    for k, other in enumerate(pipes):
-        if k == index or not NARROWEST * pipe.radius < other.radius < WIDEST * pipe.radius:
-            continue
-        away = other.middle - pipe.middle
-        along = float(away @ pipe.direction)
-        offset = float(np.linalg.norm(away - along * pipe.direction))
-        reach = 0.5 * (pipe.length + other.length) + other.radius
-        short = other.length < LONGEST_RIM * other.radius
-        parallel = abs(float(other.direction @ pipe.direction)) > math.cos(0.3 if short else 0.1)
-        if parallel and offset < (0.5 if short else 0.25) * pipe.radius and abs(along) < reach:
-            out.append(k)
-    return out
+    pipe = pipes[index]
+    radii, lengths = np.array([one.radius for one in pipes]), np.array([one.length for one in pipes])
+    away = np.array([one.middle for one in pipes]).reshape(-1, 3) - pipe.middle
+    turns = np.abs(np.array([one.direction for one in pipes]).reshape(-1, 3) @ pipe.direction)
+    along = away @ pipe.direction
+    offsets = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - along**2, 0.0))
+    short = lengths < LONGEST_RIM * radii
+    wide = (radii > NARROWEST * pipe.radius) & (radii < WIDEST * pipe.radius)
+    parallel = turns > np.where(short, math.cos(0.3), math.cos(0.1))
+    beside = offsets < np.where(short, 0.5, 0.25) * pipe.radius
+    reach = np.abs(along) < 0.5 * (pipe.length + lengths) + radii
+    found = wide & parallel & beside & reach
+    found[index] = False
+    return [int(k) for k in np.flatnonzero(found)]
 
 
 def wider_ones(pipes: Sequence[Pipe]) -> set[int]:
