@@ -24,6 +24,8 @@ SKEW = 0.25
 """Axes meet if they pass each other within so many radii, beside their uncertainty."""
 OVERSHOOT = 1.5
 """Straights may have been found so many radii too long: into the bend."""
+LOW_TURN = 0.4
+"""And over this, in radii, times the tangent of half the angle: a pipe hardly leaves a bend of a small angle."""
 MOST_POINTS = 1500
 TRIED = 28
 """Bend radii that are tried before the fit."""
@@ -38,8 +40,10 @@ SHARPEST = math.radians(100.0)
 BINS = 8
 """Pieces of the arc, at most, that are asked for points."""
 LEAST_INLIERS = 10
-LEAST_LENGTHWISE = 0.5
-"""Share of the pieces of the arc that must hold points."""
+LEAST_LENGTHWISE = 0.6
+"""Share of the pieces of the arc that must hold points, more of them on it than beside it."""
+ROUGH = 1.45
+"""Points that scatter so many times more than those of the pipes are of no bend."""
 MOST_INSIDE = 0.5
 """Points inside the tube, or just beside its surface, for each point on it."""
 BESIDE = 0.3
@@ -146,7 +150,8 @@ def _meeting(one: Pipe, end: End, two: Pipe, other: End) -> tuple[Bend, tuple[fl
     if float(np.linalg.norm(feet[0] - feet[1])) > SKEW * radius + ON_SURFACE * uncertain:
         return None
     ahead = float((feet[0] - one.at(end)) @ first), float((two.at(other) - feet[1]) @ second)
-    if min(ahead) < -OVERSHOOT * radius or max(ahead) > REACH * radius:
+    over = (OVERSHOOT + LOW_TURN / math.tan(0.5 * turn)) * radius
+    if min(ahead) < -over or max(ahead) > REACH * radius:
         return None
     return Bend(0.5 * (feet[0] + feet[1]), first, second, 0.0), ahead
 
@@ -291,10 +296,14 @@ def judged(
         return None
     length = bend.length + 2.0 * margin
     pieces = int(np.clip(length / max(2.0 * near.spacing, 1e-12), 1, BINS))
-    rows = np.clip(((along[own] + margin) / length * pieces).astype(np.int64), 0, pieces - 1)
-    lengthwise = len(np.unique(rows)) / pieces
-    if lengthwise < LEAST_LENGTHWISE:
+    rows = np.clip(((along + margin) / length * pieces).astype(np.int64), 0, pieces - 1)
+    on_it, off_it = (np.bincount(rows[which], minlength=pieces) for which in (own, inside | beside))
+    # a bend that is two shows in pieces whose points are beside it
+    lengthwise = float((on_it > off_it).mean())
+    rms = float(np.sqrt((errors[own] ** 2).mean()))
+    if lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
         return None
+    rows = rows[own]
     center = bend.meeting if bend.bend_radius == 0 else bend.center
     points = near.points[indices[own]]
     radial = points - center
@@ -309,7 +318,6 @@ def judged(
         "angle_deg": math.degrees(math.sqrt(max(0.5 * np.trace(turn), 0.0))),
         "radius": math.sqrt(max(solved.covariance[8, 8], 0.0)),
     }
-    rms = float(np.sqrt((errors[own] ** 2).mean()))
     return FittedBend(
         pipes,
         ends,

@@ -27,6 +27,8 @@ STEEPEST = 1.3
 STEPS = 22
 MOST_POINTS = 3000
 LEAST_INLIERS = 10
+FOREIGN = 0.4
+"""More points of other pipes where a reducer is, for each point of it, say that there is another pipe between."""
 PIECES = 6
 LEAST_LENGTHWISE = 0.5
 
@@ -105,7 +107,7 @@ def _facing(pipes: list[Pipe], which: tuple[int, int], ends: tuple[End, End]) ->
     gap = float((other - place) @ direction)
     if gap > (LONGEST_GAP * small if same else LONGEST_REDUCER * large) or gap < -OVERLAP * large:
         return None
-    if gap < 0 and -gap > 0.5 * min(one.length, two.length):
+    if gap < 0 and -gap > 0.5 * max(one.length, two.length):
         return None
     tilt = math.sqrt(max(float(np.trace(one.covariance[2:4, 2:4]) + np.trace(two.covariance[2:4, 2:4])), 0.0))
     turn = math.atan2(
@@ -213,6 +215,10 @@ def _judged(
     own = between & (np.abs(errors) < width)
     length = high - low
     if (large - small) > STEEPEST * length or own.sum() < LEAST_INLIERS:
+        return None
+    tube = near.about(shape.origin, shape.axis, low, high, large + shape.facing.offset + width)
+    foreign = ~near.free(tube, (shape.one.label, shape.two.label))
+    if foreign.sum() > FOREIGN * own.sum():
         return None
     inside = between & (errors < -width - 0.1 * small)
     outside = between & (errors > width) & (errors < width + 0.3 * large)

@@ -12,6 +12,7 @@ from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import Bend
 from cylx.runs.bend_fit import Solved, refined
 from cylx.runs.bending import FittedBend, judged
+from cylx.runs.narrowing import narrowed
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
 from cylx.runs.tracing import Trace, add_bend
 
@@ -60,7 +61,13 @@ def follow_ends(trace: Trace, near: Surroundings) -> int:
                 continue
             trace.followed.add((index, end))
             found = onward_bend(trace.pipes[index], index, end, len(trace.pipes), near)
-            if found is not None:
+            if found is None:
+                other = narrowed(trace.pipes[index], end, near)
+                if other is not None:
+                    trace.pipes.append(other)
+                    near.label(near.on(other), other.label)
+                    count += 1
+            else:
                 pipe, bend = found
                 trace.pipes.append(pipe)
                 add_bend(trace, bend)

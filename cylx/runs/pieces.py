@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cylx.fits.likelihood import fit_mixture
+from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction
@@ -23,6 +23,8 @@ LEAST_POINTS, LEAST_LENGTH = 30, 1.5
 """Of a piece: points, and length in its radii."""
 OWN_SHARE = 0.6
 """Share of the points about a piece that must be on it."""
+SHORT, KNOWN_TILT = 5.0, 0.02
+"""The axis of a piece shorter than so many radii is known from before, with this deviation in radians."""
 UNSURE = 0.01
 """A radius less certain than this, in itself, may be that of two pipes taken for one."""
 HOLE = 12.0
@@ -242,7 +244,11 @@ def refit(pipe: Pipe, points: FloatArray, width: float | None = None) -> Pipe | 
     model = fit[0]
     deviation = max(fit[1] * TUKEY_SPREAD, 1e-9 * float(model[RADIUS]))
     model[DIRECTION] = canonical_direction(model[DIRECTION])
-    likely = fit_mixture(points, model, low=-half, high=half, width=8.0 * deviation, deviation=deviation)
+    prior = None
+    if pipe.length < SHORT * pipe.radius:  # points at the ends that are of something else would turn its axis
+        model[DIRECTION] = pipe.direction
+        prior = Prior(direction=pipe.direction, direction_deviation=KNOWN_TILT)
+    likely = fit_mixture(points, model, low=-half, high=half, width=8.0 * deviation, deviation=deviation, prior=prior)
     if likely is None:
         return None
     model = likely.model

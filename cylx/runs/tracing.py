@@ -16,7 +16,7 @@ from cylx.runs.collars import Collar, collars_of
 from cylx.runs.crossings import equal_crossings
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
-from cylx.runs.pieces import refit
+from cylx.runs.pieces import OTHER_RADIUS, refit
 from cylx.runs.pipes import ENDS, End, Pipe, Surroundings, axis_change, tilted
 from cylx.runs.wider import wider_ones
 
@@ -151,6 +151,8 @@ def trim(trace: Trace, near: Surroundings) -> list[Pipe]:
         near.release(pipe)
         lost = trace.starts[k].length - pipe.length if k < len(trace.starts) else 0.0
         fitted = refit(pipe, near.points[near.on(pipe)]) if lost > AGAIN * pipe.radius else None
+        if fitted is not None and abs(fitted.radius - pipe.radius) > OTHER_RADIUS * pipe.radius:
+            fitted = None
         out.append(_loosened(fitted or pipe))
     return out
 
@@ -211,7 +213,7 @@ def add_reducers(trace: Trace, near: Surroundings) -> int:
     """Add the reducers between ends of different radius that face each other; return their number."""
     pairs = (one for one in facing_ends(trace.pipes, trace.closed) if not one.same_size)
     tried = (fit_reducer(one, trace.pipes, near) for one in pairs)
-    found = sorted((one for one in tried if one is not None), key=lambda one: -len(one.indices))
+    found = sorted((one for one in tried if one is not None), key=lambda one: (one.facing.gap, -len(one.indices)))
     count = 0
     for one in found:
         if trace.is_free(zip(one.facing.pipes, one.facing.ends, strict=True)):
