@@ -30,6 +30,9 @@ from cylx.runs.tracing import (
 
 __all__ = ["Traced", "trace_runs"]
 
+ROUNDS = 3
+"""Times that fittings are looked for anew, with the pipes as they are between those found before."""
+
 
 def trace_runs(
     fits: Sequence[CylinderFit],
@@ -67,16 +70,17 @@ def trace_runs(
     trace = Trace(split_crossings(settled(pipes, near), near), near)
     add_bends(trace, near)
     add_reducers(trace, near)
-    trace = Trace(trim(trace, near), near)  # straights that were found too long have bent with their fittings
-    add_bends(trace, near)
-    add_reducers(trace, near)
-    add_junctions(trace, near)
-    if follow_ends(trace, near):
-        while follow_ends(trace, near):
-            pass
-        trace = Trace(trim(trace, near), near)  # what was found along the runs is fitted together with the rest
+    for _ in range(ROUNDS):
+        # straights that were found too long have bent with their fittings; those found along the runs are new
+        trace = Trace(trim(trace, near), near)
         add_bends(trace, near)
         add_reducers(trace, near)
+        add_junctions(trace, near)
+        if not follow_ends(trace, near):
+            break
+        while follow_ends(trace, near):
+            pass
+    else:
         add_junctions(trace, near)
     add_collars(trace, near)
     add_gaps(trace, near)

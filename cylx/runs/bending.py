@@ -40,8 +40,8 @@ SHARPEST = math.radians(100.0)
 BINS = 8
 """Pieces of the arc, at most, that are asked for points."""
 LEAST_INLIERS = 10
-LEAST_LENGTHWISE = 0.6
-"""Share of the pieces of the arc that must hold points, more of them on it than beside it."""
+LEAST_LENGTHWISE, LEAST_GOOD = 0.5, 0.8
+"""Share of the pieces of the arc that must hold more points on it than beside it: of all, of those with points."""
 ROUGH = 1.45
 """Points that scatter so many times more than those of the pipes are of no bend."""
 MOST_INSIDE = 0.5
@@ -299,9 +299,11 @@ def judged(
     rows = np.clip(((along + margin) / length * pieces).astype(np.int64), 0, pieces - 1)
     on_it, off_it = (np.bincount(rows[which], minlength=pieces) for which in (own, inside | beside))
     # a bend that is two shows in pieces whose points are beside it
-    lengthwise = float((on_it > off_it).mean())
+    good, filled = on_it > off_it, on_it + off_it > 0
+    lengthwise = float(good.mean())
+    one_bend = good.sum() >= LEAST_GOOD * filled.sum()
     rms = float(np.sqrt((errors[own] ** 2).mean()))
-    if lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
+    if not one_bend or lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
         return None
     rows = rows[own]
     center = bend.meeting if bend.bend_radius == 0 else bend.center

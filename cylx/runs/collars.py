@@ -22,10 +22,14 @@ ABOVE = 2.5
 LEAST_POINTS = 12
 LONGEST_FLANGE = 1.25
 """Length of a flange or a pair along the axis, in its radius; what is longer is something else."""
+LEAST_ON_FACE = 6
+"""Points of a face that tell where it is; else those of the rim do."""
 LONGEST_INLINE = 6.0
 """Distance of the flanges at either side of something in line, in their radius."""
 LEAST_SIDES = 5
 """Sectors about the axis in which the rim of a flange must be seen, and its faces."""
+ALL_ROUND = 10
+"""Sectors in which the rim must be seen if no face is."""
 ABOUT = 7.0
 """Points up to so many radii of the pipe are looked at: a wall goes on beyond what a flange could be."""
 ROUND = 0.45
@@ -208,8 +212,7 @@ def _flange(
         return None
     about = (ring.heights > rim_heights[0] - margin) & (ring.heights < rim_heights[-1] + margin)
     solid = ring.part(about & (ring.distances < radius + margin))
-    faces = solid.distances < radius - margin
-    low, high = _faces(solid.heights[faces] if faces.sum() >= LEAST_POINTS else solid.heights, pipe.spread)
+    low, high = _ends_of(solid, solid.distances < radius - margin, pipe.spread)
     if not 0 < high - low < LONGEST_FLANGE * radius or len(solid.indices) < LEAST_POINTS:
         return None
     return _judged(solid, ring, pipe, radius, (low, high), shut)
@@ -236,7 +239,7 @@ def _judged(
         or within.sum() > MOST_WITHIN * count
         or beyond.sum() > MOST_BEYOND * count
         or sides < max(LEAST_SIDES, ROUND * len(np.unique(solid.sectors)))
-        or (wide and faces < LEAST_SIDES)
+        or (wide and faces < LEAST_SIDES and sides < ALL_ROUND)
     ):
         return None
     where: Literal["side", "start", "end"] = "side"
@@ -269,14 +272,18 @@ def _judged(
     )
 
 
-def _faces(heights: FloatArray, spread: float) -> tuple[float, float]:
-    """Return where the points begin and end along the axis."""
-    low, high = (float(value) for value in np.quantile(heights, [0.03, 0.97]))
-    for _ in range(4):
-        first, last = np.abs(heights - low) < 2.0 * spread, np.abs(heights - high) < 2.0 * spread
-        low = float(np.median(heights[first])) if first.any() else low
-        high = float(np.median(heights[last])) if last.any() else high
-    return low, high
+def _ends_of(solid: _Ring, of_face: MaskArray, spread: float) -> tuple[float, float]:
+    """Return where a flange begins and ends along the axis: at its faces, where they are seen, or those of its rim."""
+    heights, out = solid.heights, []
+    for share in (0.03, 0.97):
+        end = float(np.quantile(heights, share))
+        for _ in range(4):
+            near = np.abs(heights - end) < 2.0 * spread
+            on_face = near & of_face
+            chosen = on_face if on_face.sum() >= LEAST_ON_FACE else near
+            end = float(np.median(heights[chosen])) if chosen.any() else end
+        out.append(end)
+    return out[0], out[1]
 
 
 def _inline(first: Collar, second: Collar, ring: _Ring, pipe: Pipe, near: Surroundings) -> Collar | None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
-from cylx.runs.pieces import refit
+from cylx.runs.pieces import is_borne_out, refit
 from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings, turned
 
 RATIOS = (0.45, 0.55, 0.65, 0.73, 0.8, 0.87, 1.15, 1.25, 1.37, 1.53, 1.8, 2.2)
@@ -62,7 +62,8 @@ def narrowed(pipe: Pipe, end: End, near: Surroundings) -> Pipe | None:
     if fitted is None or abs(fitted.radius - other) > 0.1 * other:
         return None
     on = near.on(fitted, (pipe.label,))
-    if len(on) < LEAST_BEHIND or fitted.length < LEAST_LENGTH * fitted.radius:
+    short = len(on) < LEAST_BEHIND or fitted.length < LEAST_LENGTH * fitted.radius
+    if short or not is_borne_out(fitted, near.points[indices], LEAST_BEHIND):
         return None
     return replace(fitted, spread=pipe.spread)
 

@@ -12,7 +12,7 @@ from cylx.runs.pipes import Pipe
 from cylx.runs.tracing import Trace
 from cylx.runs.wider import LONGEST_RIM
 
-LEAST_LEFT, LEAST_POINTS = 0.25, 6
+LEAST_LEFT, LEAST_POINTS = 0.7, 8
 """A pipe that was found along a run has a length of so many radii, and so many points, in the end."""
 
 

@@ -295,17 +295,17 @@ def _other(rest: Pipe, near: Surroundings) -> Pipe | None:
     found = refit(first, near.points[indices], 0.35 * first.radius)
     if found is None or abs(float(found.direction @ rest.direction)) < PARALLEL:
         return None
-    return found if _is_borne_out(found, near.points[indices]) else None
+    return found if is_borne_out(found, near.points[indices]) else None
 
 
-def _is_borne_out(pipe: Pipe, points: FloatArray) -> bool:
+def is_borne_out(pipe: Pipe, points: FloatArray, least: int = LEAST_POINTS) -> bool:
     """Return whether most of the points about a pipe are on it."""
     away = points - pipe.middle
     heights = away @ pipe.direction
     errors = np.abs(np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0)) - pipe.radius)
     about = (np.abs(heights) <= 0.5 * pipe.length) & (errors < SHELL * pipe.radius)
     own = about & (errors < ON_SURFACE * pipe.spread)
-    return bool(own.sum() >= max(LEAST_POINTS, OWN_SHARE * about.sum()))
+    return bool(own.sum() >= max(least, OWN_SHARE * about.sum()))
 
 
 def differs(one: Pipe, two: Pipe) -> bool:
