@@ -15,6 +15,7 @@ from cylx.fits.nominal_radius import Catalogue
 from cylx.records import CylinderFit, Extraction, Observer, PointCloud, RejectedFit, Scene, SilentObserver
 from cylx.results import Result
 from cylx.runs import trace_runs
+from cylx.runs.constraints import fit_runs
 from cylx.runs.labels import nearest_cylinders
 
 if TYPE_CHECKING:
@@ -25,7 +26,9 @@ if TYPE_CHECKING:
 Found = TypeVar("Found", Extraction, Result)
 
 
-def find_runs(found: Found, cloud: PointCloud | ArrayLike | None = None, *, observer: Observer | None = None) -> Found:
+def find_runs(
+    found: Found, cloud: PointCloud | ArrayLike | None = None, *, fit: bool = False, observer: Observer | None = None
+) -> Found:
     """Join cylinders to runs, and find and fit what joins them; the same as `cylx runs`.
 
     Cylinders end afterwards where their fittings begin. Those that are a part of a fitting, such as the rim of a
@@ -38,6 +41,8 @@ def find_runs(found: Found, cloud: PointCloud | ArrayLike | None = None, *, obse
     cloud : PointCloud or array_like of shape (N, 3), optional
         The points of a `Result`, best those of its annotated cloud. Without points the axes alone tell the fittings.
         An `Extraction` has its own.
+    fit : bool
+        Whether cylinders move so that axes meet and angles are round, where the uncertainties allow.
     observer : Observer, optional
         Is told of the stage `runs` and its time.
 
@@ -65,33 +70,34 @@ def find_runs(found: Found, cloud: PointCloud | ArrayLike | None = None, *, obse
     if isinstance(found, Extraction):
         if cloud is not None:
             raise ValueError("an extraction has its points already; leave the cloud out")
-        out = _with_runs(found)
+        out = _with_runs(found, fit=fit)
     else:
         points = cloud if isinstance(cloud, PointCloud) or cloud is None else PointCloud.from_array(cloud)
-        out = _result_with_runs(found, points)
+        out = _result_with_runs(found, points, fit=fit)
     watching.stage_finished("runs", time.perf_counter() - began)
     return out
 
 
-def _with_runs(extraction: Extraction) -> Extraction:
+def _with_runs(extraction: Extraction, *, fit: bool) -> Extraction:
     traced = _trace(
         extraction.cylinders, extraction.cloud.points, extraction.labels, extraction.scene, extraction.config
     )
+    cylinders, piping = fit_runs(traced.cylinders, traced.piping) if fit else (traced.cylinders, traced.piping)
     kept = set(traced.origins)
     parts = [RejectedFit(fit, "part of a fitting") for i, fit in enumerate(extraction.cylinders) if i not in kept]
     return replace(
         extraction,
-        cylinders=traced.cylinders,
+        cylinders=cylinders,
         labels=traced.labels,
         residuals=traced.residuals,
         rejected=(*parts, *extraction.rejected),
-        piping=traced.piping,
+        piping=piping,
     )
 
 
-def _result_with_runs(result: Result, cloud: PointCloud | None) -> Result:
+def _result_with_runs(result: Result, cloud: PointCloud | None, *, fit: bool) -> Result:
     extraction = extraction_of(result, PointCloud(np.empty((0, 3))) if cloud is None else cloud)
-    traced = _with_runs(extraction)
+    traced = _with_runs(extraction, fit=fit)
     new = Result.lists_of(traced.cylinders, traced.piping)
     return result.model_copy(update=new)
 

@@ -39,6 +39,9 @@ RUNS = ".runs.json"
 )
 @click.option("--table", is_flag=True, help="Print the bill of quantities as CSV; write no JSON without -o.")
 @click.option(
+    "--fit-runs", is_flag=True, help="Move cylinders so that axes meet and angles are round, where uncertainties allow."
+)
+@click.option(
     "--annotated",
     metavar="FILE",
     shell_complete=complete_files,
@@ -59,6 +62,7 @@ def runs(
     scan: str | None,
     output: str | None,
     table: bool,
+    fit_runs: bool,
     annotated: str | None,
     report: str | None,
     overwrite: bool,
@@ -75,7 +79,7 @@ def runs(
 
     output = None if output is None else STREAM if output in STANDARD_OUTPUT else output
     content = Result.parse(read_json(result), result)
-    again = scan is not None or content.runs is None
+    again = scan is not None or content.runs is None or fit_runs
     if output is None and not table and again:
         output = _beside(result)
     outputs = [name for name in (output, annotated, report) if name is not None]
@@ -86,7 +90,7 @@ def runs(
         _demand_scan("--annotated" if annotated else "--report")
     cloud = None if scan is None else read_cloud(scan)
     if again:
-        content, found = _found(content, cloud)
+        content, found = _found(content, cloud, fit=fit_runs)
     else:
         found = None
     _write(content, found, output, annotated, report, overwrite=overwrite)
@@ -112,13 +116,13 @@ def _demand_scan(option: str) -> None:
     raise UsageError(option, "needs the points", "name the scan after the result")
 
 
-def _found(content: Result, cloud: PointCloud | None) -> tuple[Result, Extraction | None]:
+def _found(content: Result, cloud: PointCloud | None, *, fit: bool) -> tuple[Result, Extraction | None]:
     """Find the runs of a result; with a cloud, also as an extraction."""
     from cylx.api.piping import extraction_of, find_runs
 
     if cloud is None:
-        return find_runs(content), None
-    extraction = find_runs(extraction_of(content, cloud))
+        return find_runs(content, fit=fit), None
+    extraction = find_runs(extraction_of(content, cloud), fit=fit)
     return content.model_copy(update=content.lists_of(extraction.cylinders, extraction.piping)), extraction
 
 
@@ -155,6 +159,9 @@ def _show(path: str, content: Result, outputs: list[str]) -> None:
     written = ", ".join(printable(name) for name in outputs if name != STREAM)
     said = piping_counted(len(content.runs or ()), [one.kind for one in content.fittings or ()])
     tell(f"{printable(path)}: {said}" + (f", written to {written}" if written else ""))
+    if content.adjustments:
+        applied = sum(one.applied for one in content.adjustments)
+        tell(f"{applied} constraints applied, {len(content.adjustments) - applied} refused; see 'adjustments'")
     rows = runs_rows(content)
     if rows:
         show_table(RUNS_HEADER, rows, err=True)

@@ -20,6 +20,7 @@ from cylx.records.cylinders import (
     Segment,
 )
 from cylx.records.fittings import (
+    Adjustment,
     Cap,
     Cross,
     Elbow,
@@ -42,6 +43,7 @@ from cylx.records.tiled import TiledExtraction, Tiling
 
 __all__ = [
     "CELL",
+    "Adjustment",
     "Candidates",
     "Cap",
     "Cluster",

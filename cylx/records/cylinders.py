@@ -209,6 +209,8 @@ class CylinderFit:
         Deviation of the surface from a cylinder, that neighbouring points share, scene units; None if not measured.
     side : {'convex', 'concave', 'unknown'} or None
         That of a pin, that of a bore, or neither can be told; None if not measured.
+    measured : Cylinder or None
+        The shape as it was measured, if it was moved since, so that its run is as it was built.
     """
 
     cylinder: Cylinder
@@ -223,6 +225,7 @@ class CylinderFit:
     nominal: NominalRadius | None = None
     form: float | None = None
     side: Literal["convex", "concave", "unknown"] | None = None
+    measured: Cylinder | None = None
 
     @property
     def radius_sd(self) -> float | None:

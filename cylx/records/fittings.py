@@ -290,6 +290,36 @@ class PipeRun:
     loops: int = 0
 
 
+@dataclass(frozen=True, slots=True)
+class Adjustment:
+    """What came of a constraint on a run that was fitted as it was built.
+
+    Parameters
+    ----------
+    fitting : int or None
+        The fitting that asks for it; None for the radius of a size.
+    what : str
+        `meeting` (the axes meet), `angle_deg` (their angle is round), `line` (they are one line, or parallel) or
+        `radius` (that of all cylinders of the size).
+    cylinders : tuple of int
+        Ids of the cylinders it is about.
+    measured, target : float
+        Value before, and with the constraint: scene units, degrees for `angle_deg`; of `line` also radians.
+    std : float
+        Standard deviation of the measured value.
+    applied : bool
+        Whether it holds now; otherwise it was refused, as the measured value contradicts it.
+    """
+
+    fitting: int | None
+    what: str
+    cylinders: tuple[int, ...]
+    measured: float
+    target: float
+    std: float
+    applied: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Piping:
     """The fittings and the runs of a cloud.
@@ -302,11 +332,14 @@ class Piping:
         By length, descending; the index is the `id`. A cylinder that nothing joins is a run of its own.
     labels : ndarray of shape (N,), int32
         Fitting of each point of the cloud, -1 for none; empty if there was no cloud.
+    adjustments : tuple of Adjustment or None
+        What moved so that the runs are as they were built, and what was refused; None if that was not asked for.
     """
 
     fittings: tuple[Fitting, ...]
     runs: tuple[PipeRun, ...]
     labels: NDArray[np.int32] = field(default_factory=lambda: np.empty(0, np.int32))
+    adjustments: tuple[Adjustment, ...] | None = None
 
     def run_ids(self, cylinders: NDArray[np.int32]) -> NDArray[np.int32]:
         """Return the run of each point.

@@ -11,7 +11,7 @@ from cylx.results.cylinders import Numbered
 from cylx.results.parts import Count, Length, Number, Part, Vector, drop_missing, plain_numbers
 
 if TYPE_CHECKING:
-    from cylx.records.fittings import Fitting, PipeRun
+    from cylx.records.fittings import Adjustment, Fitting, PipeRun
 
 Positive = Annotated[Number, Field(gt=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]
@@ -277,3 +277,43 @@ class ResultRun(Numbered):
         content = self.model_dump(mode="json")
         drop_missing([content, *content["sizes"]])
         return content
+
+
+class ResultAdjustment(Part):
+    """What came of a constraint on a run that was fitted as it was built."""
+
+    fitting: Count | None = None
+    """Id of the fitting that asks for it; absent for a radius."""
+    what: Literal["meeting", "angle_deg", "line", "radius"]
+    """Axes meet; their angle is round; they are one line, or parallel; one radius for all cylinders of a size."""
+    cylinders: list[Count]
+    """Ids of the cylinders it is about."""
+    measured: Number
+    """Value before: scene units, degrees for `angle_deg`; of `line` also radians."""
+    target: Number
+    """Value if it holds, in the same unit."""
+    std: Length
+    """Standard deviation of the measured value."""
+    applied: bool
+    """Whether it holds now; otherwise the measured value contradicts it."""
+
+    def to_object(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        content = self.model_dump(mode="json")
+        drop_missing([content])
+        return content
+
+    @classmethod
+    def of(cls, one: Adjustment) -> ResultAdjustment:
+        """Describe an adjustment."""
+        return cls.model_validate(
+            {
+                "fitting": one.fitting,
+                "what": one.what,
+                "cylinders": list(one.cylinders),
+                "measured": float(one.measured),
+                "target": float(one.target),
+                "std": float(one.std),
+                "applied": one.applied,
+            }
+        )

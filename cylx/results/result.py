@@ -18,7 +18,7 @@ from cylx.config import describe_fault
 from cylx.config.choices import Method
 from cylx.errors import InputError
 from cylx.results.cylinders import ResultBlend, ResultCylinder
-from cylx.results.fittings import AnyFitting, ResultRun, fitting_of
+from cylx.results.fittings import AnyFitting, ResultAdjustment, ResultRun, fitting_of
 from cylx.results.parts import Count, Input, Length, Part, drop_missing, text_of
 from cylx.results.table import dataframe_of
 from cylx.version import __version__
@@ -105,6 +105,8 @@ class Result(Part):
     """What joins the cylinders: elbows, tees, reducers, flanges and more; absent if they were not looked for."""
     runs: list[ResultRun] | None = None
     """The cylinders that are joined, the longest run first; absent if they were not looked for."""
+    adjustments: list[ResultAdjustment] | None = None
+    """What moved so that the runs are as they were built, and what was refused; absent if that was not asked for."""
     warnings: list[str]
     """What a user should know before trusting the result."""
 
@@ -145,7 +147,9 @@ class Result(Part):
         fittings = None if piping is None else [fitting_of(i, one) for i, one in enumerate(piping.fittings)]
         runs = None if piping is None else [ResultRun.of(i, run) for i, run in enumerate(piping.runs)]
         listed = [ResultCylinder.of(i, fit) for i, fit in enumerate(cylinders)]
-        return {"cylinders": listed, "fittings": fittings, "runs": runs}
+        moved = None if piping is None else piping.adjustments
+        adjusted = None if moved is None else [ResultAdjustment.of(one) for one in moved]
+        return {"cylinders": listed, "fittings": fittings, "runs": runs, "adjustments": adjusted}
 
     @classmethod
     def parse(cls, mapping: Mapping[str, Any], place: str) -> Result:
@@ -203,6 +207,8 @@ class Result(Part):
             lists["fittings"] = [fitting.to_object() for fitting in self.fittings]
         if self.runs is not None:
             lists["runs"] = [run.to_object() for run in self.runs]
+        if self.adjustments is not None:
+            lists["adjustments"] = [one.to_object() for one in self.adjustments]
         return content | lists
 
     def __repr__(self) -> str:

@@ -14,7 +14,7 @@ from cylx.runs.bend_fit import Solved, refined
 from cylx.runs.bending import FittedBend, judged
 from cylx.runs.narrowing import narrowed
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
-from cylx.runs.tracing import Trace, add_bend
+from cylx.runs.tracing import Trace, add_fitted
 
 AHEAD = 14.0
 """How far ahead is looked, in radii."""
@@ -70,7 +70,7 @@ def follow_ends(trace: Trace, near: Surroundings) -> int:
             else:
                 pipe, bend = found
                 trace.pipes.append(pipe)
-                add_bend(trace, bend)
+                add_fitted(trace, [bend])
                 near.label(near.on(trace.pipes[-1]), pipe.label)
                 count += 1
     return count

@@ -11,6 +11,7 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import canonical_direction
 from cylx.records import Cap, Cross, Elbow, Fitting, Flange, Inline, Joint, Junction, Reducer
+from cylx.runs.bend_fit import bend_of
 from cylx.runs.bending import NEARBY, FittedBend, Meeting, fit_meeting, gap_before, is_loose, meetings
 from cylx.runs.collars import Collar, collars_of
 from cylx.runs.crossings import equal_crossings
@@ -108,9 +109,24 @@ def add_bends(trace: Trace, near: Surroundings) -> int:
         if not keys & ends:
             ends |= keys
             accepted.append((meeting, fitted))
-    for one in _together(accepted, trace.pipes, near):
-        add_bend(trace, one)
+    add_fitted(trace, _together(accepted, trace.pipes, near))
     return len(accepted)
+
+
+def add_fitted(trace: Trace, found: list[FittedBend]) -> None:
+    """Add elbows, with the axis of each pipe as the fit has it that knows it best; pipes end where elbows begin."""
+    before = list(trace.pipes)
+    for one in found:
+        for k, index in enumerate(one.pipes):
+            pipe = with_axis(before[index], one.shifts[k], one.covariances[k])
+            known = trace.pipes[index]
+            if float(np.trace(pipe.covariance[2:4, 2:4])) < float(np.trace(known.covariance[2:4, 2:4])):
+                trace.pipes[index] = pipe
+    nothing = np.zeros(8)
+    for one in found:
+        first, second = (trace.pipes[index] for index in one.pipes)
+        bend, _ = bend_of(first, second, (one.ends[0], one.ends[1]), nothing, one.bend.bend_radius)
+        _add_bend(trace, replace(one, bend=bend))
 
 
 def _together(found: list[tuple[Meeting, FittedBend]], pipes: list[Pipe], near: Surroundings) -> list[FittedBend]:
@@ -165,12 +181,11 @@ def _loosened(pipe: Pipe) -> Pipe:
     return replace(pipe, covariance=pipe.covariance + np.diag([offset, offset, tilt, tilt, 0.0]))
 
 
-def add_bend(trace: Trace, one: FittedBend) -> None:
+def _add_bend(trace: Trace, one: FittedBend) -> None:
     """Add an elbow, and let its pipes end where it begins."""
     bend = one.bend
-    for k, (index, end) in enumerate(zip(one.pipes, one.ends, strict=True)):
-        pipe = with_axis(trace.pipes[index], one.shifts[k], one.covariances[k])
-        trace.pipes[index] = pipe.with_end(end, bend.start if k == 0 else bend.end)
+    for index, end, place in zip(one.pipes, one.ends, (bend.start, bend.end), strict=True):
+        trace.pipes[index] = trace.pipes[index].with_end(end, place)
     fitting = Elbow(
         joins=one.pipes,
         ends=one.ends,
