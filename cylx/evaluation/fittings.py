@@ -32,8 +32,8 @@ class KindScore:
     truth, predicted, matched : int
         Number of true fittings that must be found, of fittings in the result, and of matched pairs.
     ignored : int
-        Fittings of the result in the place of true ones, of whatever kind, that need not be found; they count neither
-        as correct nor as false.
+        Fittings of the result in the place of true ones, of whatever kind, that need not be found, or between their
+        ends; they count neither as correct nor as false.
     precision, recall, f1 : float
         In [0, 1]; all 1 if there is nothing to find and nothing was found.
     missed, false : tuple of int
@@ -84,6 +84,8 @@ class _Fitting:
     scale: float
     bend: tuple[float, ...]
     ignore: bool
+    half: float
+    """Half the distance of its ends, 0 if it has none."""
 
 
 def score_fittings(
@@ -120,7 +122,8 @@ def score_fittings(
     radii = dict(zip(known.ids, known.radii.tolist(), strict=True))
     true, found = _read(truth, "truth", radii), _read(result, "result", None)
     near = _nearness(true, found)
-    at_ignored = set(np.flatnonzero((near[[one.ignore for one in true]] < 1).any(axis=0)).tolist())
+    reach = np.array([1 + one.half / one.scale if one.ignore else 0.0 for one in true])
+    at_ignored = set(np.flatnonzero((near < reach[:, None]).any(axis=0)).tolist())
     kinds, pairs = {}, []
     for kind in KINDS:
         rows = [i for i, one in enumerate(true) if one.kind == kind and not one.ignore]
@@ -197,7 +200,12 @@ def _read_one(entry: Mapping[str, object], index: int, here: str, radii: Mapping
         where = np.full(3, np.nan)
     scale = np.nan if radii is None else _scale_of(entry, where, (*bend, *sizes), here, radii)
     own_id, ignore = read_id(entry.get("id", index), f"{here}.id"), bool(entry.get("ignore", False))
-    return _Fitting(kind, own_id, where, tuple(sorted(sizes)), scale, bend, ignore)
+    half = 0.0
+    if "start" in entry and "end" in entry:
+        with np.errstate(over="ignore", invalid="ignore"):
+            ends = (np.array(read_vector(entry, key, here)) for key in ("start", "end"))
+            half = 0.5 * float(np.linalg.norm(np.subtract(*ends)))
+    return _Fitting(kind, own_id, where, tuple(sorted(sizes)), scale, bend, ignore, half)
 
 
 def _numbers(entry: Mapping[str, object], keys: Sequence[str], here: str) -> tuple[float, ...]:

@@ -152,6 +152,12 @@ def test_what_need_not_be_found_is_ignored_whatever_it_is_taken_for():
     assert (kinds["joint"].ignored, kinds["joint"].precision, kinds["inline"].f1) == (1, 1, 1)
 
 
+def test_what_is_between_the_ends_of_one_that_need_not_be_found_is_ignored():
+    chord = {"kind": "joint", "joins": [0, 1], "start": [0, 0, 0], "end": [10, 10, 0]}  # 2.9 from the middle of the arc
+    assert judged([elbow(10.0, ignore=True)], [chord]).kinds["joint"].ignored == 1
+    assert judged([elbow(10.0)], [chord]).kinds["joint"].ignored == 0
+
+
 def test_numbers_that_are_none_match_nothing():
     found = [elbow(center=[math.nan, 0, 0]), elbow(radius=math.nan), fitting("cap", (math.inf, 0, 0))]
     kinds = judged([elbow(), fitting("cap")], found).kinds
