@@ -5,9 +5,10 @@ Both take JSON objects: any mapping whose `cylinders` have `axis_point`, `axis_d
 these are evaluated, too.
 """
 
+from cylx.evaluation.differences import Difference, Tolerances
 from cylx.evaluation.fittings import FittingScores, KindScore
 from cylx.evaluation.rates import Spread
-from cylx.evaluation.regression import Comparison, Difference, Tolerances, compare
+from cylx.evaluation.regression import Comparison, compare
 from cylx.evaluation.runs import RunScore
 from cylx.evaluation.scoring import Evaluation, Match, evaluate
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from cylx.fits.nominal_radius import Catalogue
 from cylx.geometry.arrays import FloatArray
 from cylx.records import CylinderFit
-from cylx.runs.answer import Traced, answer_of
+from cylx.runs.answer import Traced, answer_of, in_order
 from cylx.runs.crossings import split_crossings
 from cylx.runs.graph import find_runs
 from cylx.runs.onward import follow_ends
@@ -85,6 +85,6 @@ def trace_runs(
     add_collars(trace, near)
     add_gaps(trace, near)
     add_caps(trace, near)
-    trace = drop_parts(trace)
+    trace = in_order(drop_parts(trace))
     runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)
     return answer_of(trace, runs, fits, near)

@@ -12,7 +12,7 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import cylinder_coordinates
 from cylx.records import CylinderFit, Fitting, PipeRun, Piping
-from cylx.runs.pipes import Pipe, Surroundings
+from cylx.runs.pipes import Pipe, Surroundings, swapped
 from cylx.runs.tracing import Trace
 
 PLACES = ("center", "start", "end")
@@ -67,6 +67,20 @@ def answer_of(trace: Trace, runs: tuple[PipeRun, ...], fits: Sequence[CylinderFi
     fittings = tuple(_moved(one, near.origin) for one in trace.fittings)
     sources = tuple(pipe.source for pipe in trace.pipes)
     return Traced(tuple(cylinders), sources, owners, residuals, Piping(fittings, runs, fitting_of))
+
+
+def in_order(trace: Trace) -> Trace:
+    """Return what was traced with the ends of all pipes as cylinders have them."""
+    out = Trace([pipe.canonical() for pipe in trace.pipes], trace.near)
+    changed = {k for k, pipe in enumerate(trace.pipes) if pipe.is_turned}
+    for fitting, points in zip(trace.fittings, trace.points, strict=True):
+        out.add(turn_ends(fitting, changed), points)
+    return out
+
+
+def turn_ends(fitting: Fitting, changed: set[int]) -> Fitting:
+    """Return a fitting with the names of the ends of some pipes the other way round."""
+    return replace(fitting, ends=swapped(fitting.ends, fitting.joins, changed))
 
 
 def _cylinder(

@@ -15,8 +15,9 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.lines import common_perpendicular
 from cylx.records import CylinderFit, Elbow, Fitting, Junction, PipeRun, Piping, Reducer
 from cylx.records.fittings import Adjustment
+from cylx.runs.answer import turn_ends
 from cylx.runs.bend import Bend
-from cylx.runs.pipes import Pipe, tilted
+from cylx.runs.pipes import OTHER, Pipe, tilted
 
 ROUND_ANGLES = tuple(math.radians(angle) for angle in (15.0, 22.5, 30.0, 45.0, 60.0, 67.5, 75.0, 90.0))
 """Angles of fittings that are made."""
@@ -86,11 +87,19 @@ def fit_runs(cylinders: Sequence[CylinderFit], piping: Piping) -> tuple[tuple[Cy
     for k, fitting in enumerate(piping.fittings):
         if any(new[i] is not pipes[i] for i in fitting.joins):
             fittings[k] = _touching(fitting, new, origin)
+    changed = {i for i, pipe in enumerate(new) if pipe.is_turned}
+    fittings = [turn_ends(fitting, changed) for fitting in fittings]
+    runs = [_with_turned_ends(run, changed) for run in piping.runs]
     out = []
     for fit, old, pipe in zip(cylinders, pipes, new, strict=True):
         same = pipe is old
         out.append(fit if same else replace(fit, cylinder=pipe.cylinder(origin), measured=fit.measured or fit.cylinder))
-    return tuple(out), replace(piping, fittings=tuple(fittings), adjustments=tuple(told))
+    return tuple(out), replace(piping, fittings=tuple(fittings), runs=tuple(runs), adjustments=tuple(told))
+
+
+def _with_turned_ends(run: PipeRun, changed: set[int]) -> PipeRun:
+    ends = [replace(one, end=OTHER[one.end]) if one.cylinder in changed else one for one in run.open_ends]
+    return replace(run, open_ends=tuple(ends))
 
 
 def _certain(pipe: Pipe) -> Pipe:

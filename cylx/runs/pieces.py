@@ -265,7 +265,7 @@ def refit(pipe: Pipe, points: FloatArray, width: float | None = None) -> Pipe | 
         spread=min(spread, 2.0 * pipe.spread),
         covariance=covariance,
     )
-    return found.with_ends(pipe.start, pipe.end)
+    return found.with_ends(*turned(pipe.start, pipe.end))
 
 
 def _rest(pipe: Pipe, best: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) -> list[Pipe]:

@@ -15,6 +15,7 @@ from cylx.geometry.cells import Cells
 from cylx.geometry.cylinder import Cylinder, axis_basis, canonical_direction, cylinder_coordinates
 from cylx.geometry.morton import BITS, morton_codes
 from cylx.records import CylinderFit
+from cylx.records.fittings import End as Where
 
 End = Literal["start", "end"]
 ENDS: tuple[End, End] = ("start", "end")
@@ -118,6 +119,18 @@ class Pipe:
         """Return it with one end moved along its axis to the foot of a place."""
         return self.with_ends(place, self.end) if end == "start" else self.with_ends(self.start, place)
 
+    @property
+    def is_turned(self) -> bool:
+        """Whether a cylinder has its ends the other way round."""
+        return float(canonical_direction(self.direction) @ self.direction) < 0
+
+    def canonical(self) -> Pipe:
+        """Return it with its ends as a cylinder has them, and its covariance in the basis of that direction."""
+        if not self.is_turned:
+            return self
+        signs = np.array([-1.0, 1.0, 1.0, -1.0, 1.0])
+        return replace(self, start=self.end, end=self.start, covariance=self.covariance * np.outer(signs, signs))
+
     def cylinder(self, origin: FloatArray) -> Cylinder:
         """Return its shape in scene units."""
         return Cylinder(self.middle + origin, self.direction, self.radius, self.length)
@@ -127,6 +140,14 @@ def turned(start: FloatArray, end: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Order two ends as a cylinder has them: along the canonical direction."""
     forward = float(canonical_direction(end - start) @ (end - start)) > 0
     return (start, end) if forward else (end, start)
+
+
+OTHER: dict[Where, Where] = {"start": "end", "end": "start", "side": "side"}
+
+
+def swapped(ends: Sequence[Where], joins: Sequence[int], changed: set[int]) -> tuple[Where, ...]:
+    """Return the names of ends with those of some pipes the other way round."""
+    return tuple(OTHER[end] if pipe in changed else end for end, pipe in zip(ends, joins, strict=True))
 
 
 class Surroundings:
