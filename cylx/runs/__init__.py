@@ -17,6 +17,7 @@ from cylx.runs.onward import follow_ends
 from cylx.runs.parts import drop_parts
 from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
+from cylx.runs.roughness import is_rough
 from cylx.runs.tracing import (
     Trace,
     add_bends,
@@ -67,12 +68,14 @@ def trace_runs(
     """
     near = Surroundings(points, labels, spacing, noise)
     pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
-    trace = Trace(split_crossings(settled(pipes, near), near), near)
+    pipes = split_crossings(settled(pipes, near), near)
+    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_bore or is_rough(pipe, near))
+    trace = Trace(pipes, near, others=others)
     add_bends(trace, near)
     add_reducers(trace, near)
     for _ in range(ROUNDS):
         # straights that were found too long have bent with their fittings; those found along the runs are new
-        trace = Trace(trim(trace, near), near)
+        trace = Trace(trim(trace, near), near, others=others)
         add_bends(trace, near)
         add_reducers(trace, near)
         add_junctions(trace, near)

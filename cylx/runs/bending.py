@@ -282,6 +282,8 @@ def judged(
 ) -> FittedBend | None:
     """Return a fitted bend with its evidence; None if the points do not show it."""
     bend, radius = solved.bend, solved.radius
+    if bend.bend_radius > 1.1 * WIDEST_BEND * radius:
+        return None
     along, distances = bend.coordinates(near.points[indices])
     errors = distances - radius
     width = ON_SURFACE * spread + 0.01 * radius

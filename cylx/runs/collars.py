@@ -22,6 +22,10 @@ ABOVE = 2.5
 LEAST_POINTS = 12
 LONGEST_FLANGE = 1.25
 """Length of a flange or a pair along the axis, in its radius; what is longer is something else."""
+THICKEST_PAIR, THICKEST_DISC = 0.9, 0.45
+"""Thickness of a pair of flanges, and of one at the end of a pipe, in its radius: thicker discs are heads."""
+LEAST_PIPE = 2.5
+"""A pipe is at least so long, in the radius of its flange."""
 LEAST_ON_FACE = 6
 """Points of a face that tell where it is; else those of the rim do."""
 LONGEST_INLINE = 6.0
@@ -248,6 +252,9 @@ def _judged(
         where = "start"
     elif middle > pipe.length - reach and not shut[1]:
         where = "end"
+    thickest = THICKEST_PAIR if where == "side" else THICKEST_DISC
+    if thickness > thickest * radius or pipe.length < LEAST_PIPE * radius:
+        return None
     errors = np.where(rim[on], solid.distances[on] - radius, 0.0)
     coverage = sides / SECTORS
     std = {

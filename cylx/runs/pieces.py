@@ -14,6 +14,7 @@ from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction
 from cylx.runs.facing import facing_ends
 from cylx.runs.pipes import LEAST_SPREAD, ON_SURFACE, End, Pipe, Surroundings, turned
+from cylx.runs.roughness import is_rough
 
 SHELL = 0.3
 """Points within so many radii of the surface, but not on it, say that the pipe is not there."""
@@ -52,7 +53,10 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
         return list(pipes)
     out, more = [], []
     for pipe in pipes:
-        pieces = _pieces(pipe, near, [one for one in pipes if one is not pipe], DEPTH)
+        rough = is_rough(pipe, near)
+        pieces = [] if rough else _pieces(pipe, near, [one for one in pipes if one is not pipe], DEPTH)
+        if any(is_rough(piece, near) for piece in pieces):
+            pieces = []
         first = max(pieces, key=lambda one: one.length) if pieces else pipe
         for piece in pieces:
             if piece is first:

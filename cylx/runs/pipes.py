@@ -46,6 +46,8 @@ class Pipe:
         What `Surroundings` calls its points.
     source : int or None
         Index of the cylinder that it was; None for one that was found along a run.
+    is_bore : bool
+        Whether its surface is seen from inside.
     length : float
         Length of its axis.
     direction : ndarray of shape (3,)
@@ -59,6 +61,7 @@ class Pipe:
     covariance: FloatArray
     label: int
     source: int | None = None
+    is_bore: bool = False
     length: float = field(init=False)
     direction: FloatArray = field(init=False)
 
@@ -76,7 +79,16 @@ class Pipe:
         unknown = np.diag([offset**2, offset**2, tilt**2, tilt**2, offset**2])
         covariance = unknown if fit.covariance is None else np.asarray(fit.covariance, np.float64)
         spread = max(fit.rmse if fit.inliers else noise, LEAST_SPREAD * shape.radius)
-        return cls(shape.start - origin, shape.end - origin, shape.radius, spread, covariance, index, index)
+        return cls(
+            shape.start - origin,
+            shape.end - origin,
+            shape.radius,
+            spread,
+            covariance,
+            index,
+            index,
+            fit.side == "concave",
+        )
 
     @property
     def middle(self) -> FloatArray:

@@ -53,8 +53,10 @@ class Trace:
         Ends that were followed onward.
     starts : list of Pipe
         The pipes before any fitting was found.
+    others : frozenset of int
+        Cylinders that are no pipes: bores, and what is too rough.
     aside : set of int
-        Cylinders that are rims or covers of pipes.
+        These, and the rims and covers of pipes.
     """
 
     pipes: list[Pipe]
@@ -65,10 +67,11 @@ class Trace:
     followed: set[tuple[int, End]] = field(default_factory=set)
     starts: list[Pipe] = field(init=False)
 
+    others: frozenset[int] = frozenset()
     aside: set[int] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.starts, self.aside = list(self.pipes), wider_ones(self.pipes)
+        self.starts, self.aside = list(self.pipes), wider_ones(self.pipes) | self.others
 
     @property
     def closed(self) -> set[tuple[int, End]]:
