@@ -69,7 +69,7 @@ def trace_runs(
     near = Surroundings(points, labels, spacing, noise)
     pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
     pipes = split_crossings(settled(pipes, near), near)
-    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_bore or is_rough(pipe, near))
+    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_other or is_rough(pipe, near))
     trace = Trace(pipes, near, others=others)
     add_bends(trace, near)
     add_reducers(trace, near)

@@ -97,10 +97,10 @@ def trust(inliers: int, lengthwise: float, wrong: float = 0.0) -> float:
     return float(np.clip((1.0 - np.exp(-inliers / 10.0)) * (0.4 + 0.6 * lengthwise) * (1.0 - 0.5 * wrong), 0.0, 0.99))
 
 
-def add_bends(trace: Trace, near: Surroundings) -> int:
-    """Add the elbows between pipes whose axes meet; return their number."""
+def add_bends(trace: Trace, near: Surroundings, only: frozenset[int] | None = None) -> int:
+    """Add the elbows between pipes whose axes meet, or `only` those of some pipes; return their number."""
     tried = []
-    for meeting in meetings(trace.pipes, trace.closed):
+    for meeting in meetings(trace.pipes, trace.closed, only):
         fitted = fit_meeting(meeting, [trace.pipes[i] for i in meeting.pipes], near)
         if fitted is not None:
             gap = gap_before(fitted, trace.pipes) / fitted.radius
