@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import axis_basis
 from cylx.geometry.lines import common_perpendicular
 from cylx.records import CylinderFit, Elbow, Fitting, Junction, PipeRun, Piping, Reducer
-from cylx.records.fittings import Adjustment
+from cylx.records.piping import Adjustment
 from cylx.runs.answer import turn_ends
 from cylx.runs.bend import Bend
 from cylx.runs.pipes import OTHER, Pipe, tilted
@@ -152,8 +153,6 @@ def _turn(axes: list[tuple[FloatArray, FloatArray]]) -> float:
 
 def _in_line(part: int, pipe: Pipe) -> Measure:
     """Return a part of what is 0 for axes in line: two of the directions, and two of their distance halfway."""
-    from cylx.geometry.cylinder import axis_basis  # noqa: PLC0415
-
     basis = axis_basis(pipe.direction)
 
     def measure(axes: list[tuple[FloatArray, FloatArray]]) -> float:
