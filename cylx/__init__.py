@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from cylx.api import read_result as read_result
     from cylx.api import to_dataframe as to_dataframe
     from cylx.api import to_dict as to_dict
+    from cylx.api.piping import find_runs as find_runs
     from cylx.api.tiled import extract_tiled as extract_tiled
     from cylx.config import Config as Config
     from cylx.config import load_config as load_config
@@ -52,6 +53,7 @@ _HOMES = {
     "evaluate": "cylx.api",
     "extract": "cylx.api",
     "extract_tiled": "cylx.api.tiled",
+    "find_runs": "cylx.api.piping",
     "fit_cylinder": "cylx.pipeline.segmented",
     "load_config": "cylx.config",
     "plot_radii": "cylx.report",

@@ -39,6 +39,7 @@ def extract(
     catalogue: Given | str | PathLike[str] | None = None,
     min_coverage_deg: float | None = None,
     blends: bool | None = None,
+    runs: bool = False,
     crop: Crop | None = None,
     voxel: float | None = None,
     every: int | None = None,
@@ -86,6 +87,8 @@ def extract(
     blends : bool, optional
         Whether to look for arcs that go on tangentially, such as rounds and fillets; they are in `Extraction.blends`.
         By default as configured, and that is yes.
+    runs : bool
+        Whether to join the cylinders to runs, as `cylx.find_runs` does; they are in `Extraction.piping`.
     crop : pair of triples of float or None, optional
         Smallest and largest coordinates of the points to use; None sets no bound.
     voxel : float, optional
@@ -146,16 +149,24 @@ def extract(
     check_tolerance(settings, options)
     chosen = None if classes is None else tuple(classes)
     selection = Selection(crop=crop, voxel=voxel, every=every, classes=chosen, scan=scan)
-    if isinstance(points_or_path, str | PathLike):
-        cloud = read_cloud(Path(points_or_path), scan=scan)
-    elif scan is not None:
-        raise ValueError("scan needs a file, and an array was given")
-    else:
-        given = points_or_path
-        cloud = given if isinstance(given, PointCloud) else PointCloud.from_array(given)
+    cloud = _cloud_of(points_or_path, scan)
     observer = observer or SilentObserver()
     compile_kernels(observer)
-    return extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
+    found = extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
+    if not runs:
+        return found
+    from cylx.api.piping import find_runs  # noqa: PLC0415  for this alone
+
+    return find_runs(found, observer=observer)
+
+
+def _cloud_of(given: ArrayLike | PointCloud | str | PathLike[str], scan: int | None) -> PointCloud:
+    """Return the cloud that was given, in whatever form."""
+    if isinstance(given, str | PathLike):
+        return read_cloud(Path(given), scan=scan)
+    if scan is not None:
+        raise ValueError("scan needs a file, and an array was given")
+    return given if isinstance(given, PointCloud) else PointCloud.from_array(given)
 
 
 def read_result(path: str | PathLike[str]) -> Result:
@@ -186,7 +197,8 @@ def evaluate(
 
     A pair is admissible if its errors (see `cylx.evaluation.Match`) are all below the given limits. Among the
     admissible pairs as many as possible are matched, at the least sum of errors over limits. True cylinders marked
-    `ignore` need not be found.
+    `ignore` need not be found. If both list `fittings` and `runs`, as the truth of `cylx.synthetic.piping` does, these
+    are scored, too (see `cylx.evaluation.FittingScores` and `cylx.evaluation.RunScore`).
 
     Parameters
     ----------

@@ -16,6 +16,7 @@ from cylx.version import __version__
     cls=LazyGroup,
     homes={
         "extract": "cylx.cli.extract",
+        "runs": "cylx.cli.runs",
         "view": "cylx.cli.view",
         "info": "cylx.cli.info",
         "config": "cylx.cli.config",

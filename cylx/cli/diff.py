@@ -38,7 +38,7 @@ _TOLERANCE = NumberRange(min=0)
 @json_option
 @debug_option
 def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
-    """Compare the cylinders and the blends of the results A and B within tolerances.
+    """Compare the cylinders, the blends, and the fittings and runs of the results A and B within tolerances.
 
     Their order does not matter. The exit code is 0 if the results agree and 1 if not; the differences
     are shown.
@@ -56,14 +56,16 @@ def diff(*, a: str, b: str, as_json: bool, **tolerances: float) -> None:
         header = ["what", "id in A", "id in B", "of", "A", "B", "difference", "tolerance"]
         show_table(header, [_row(difference) for difference in comparison.differences])
     else:
-        answer(f"the same {counted(comparison.matched, comparison.blends_matched)}\n")
+        piping = comparison.piping
+        also = f" and {piping.counts['fittings_matched']} fittings" if piping is not None and piping.counts else ""
+        answer(f"the same {counted(comparison.matched, comparison.blends_matched)}{also}\n")
     if not comparison.same:
         raise click.exceptions.Exit(1)
 
 
 def _row(difference: Difference) -> list[str]:
     """Format one row of the table."""
-    prefix = "" if difference.of == "cylinders" else "blend "
+    prefix = "" if difference.of == "cylinders" else f"{difference.of.removesuffix('s')} "
     ids = ["" if number is None else f"{prefix}{number}" for number in (difference.id_a, difference.id_b)]
     values = (difference.a, difference.b, difference.difference, difference.tolerance)
     return [difference.kind, *ids, difference.what, *("" if v is None else f"{v:.6g}" for v in values)]

@@ -14,7 +14,7 @@ from cylx.cli.terminal.failures import answer, called_by_file, tell
 from cylx.cli.terminal.group import ExampleCommand
 
 if TYPE_CHECKING:
-    from cylx.evaluation import Evaluation
+    from cylx.evaluation import Evaluation, KindScore, RunScore
 
 _SHARE = NumberRange(0, 1)
 _ERROR = NumberRange(min=0)
@@ -45,10 +45,11 @@ _ERROR = NumberRange(min=0)
 def evaluate(
     *, result: str, truth: str, angle_deg: float, offset: float, radius: float, as_json: bool, **bars: float | None
 ) -> None:
-    """Compare the cylinders of RESULT with those of TRUTH.
+    """Compare the cylinders of RESULT with those of TRUTH, and fittings and runs if both have them.
 
     Both are JSON files; 'cylx synth' writes the truth of its scenes. Cylinders are matched one to one if angle, offset
-    and radius are within their limits. Without a BAR option the exit code is 0 whatever the result.
+    and radius are within their limits, fittings if kind, place and radius agree. Without a BAR option the exit code is
+    0 whatever the result.
     """
     from cylx import evaluation
     from cylx.io import read_json
@@ -112,7 +113,34 @@ def as_text(outcome: Evaluation) -> str:
             lines.append(f"{name:<9} {', '.join(values)}")
     lines += [f"missed    {', '.join(map(str, outcome.missed))}"] if outcome.missed else []
     lines += [f"false     {', '.join(map(str, outcome.false))}"] if outcome.false else []
+    lines += [*_fitting_lines(outcome), *_run_lines(outcome)]
     return "\n".join(lines) + "\n"
+
+
+def _fitting_lines(outcome: Evaluation) -> Iterator[str]:
+    """Yield a line for each kind of fitting, and one for the measures of the elbows."""
+    if outcome.fittings is None:
+        return
+    for kind, score in outcome.fittings.kinds.items():
+        counts = f"truth {score.truth}, found {score.predicted}, matched {score.matched}, ignored {score.ignored}"
+        yield f"{kind:<9} {counts}, {_rates(score)}"
+    bend, angle = outcome.fittings.bend_radius, outcome.fittings.angle_deg
+    if bend is not None and angle is not None and outcome.fittings.good_elbows is not None:
+        off = f"bend radius median {bend.median:.3g}, max {bend.max:.3g}"
+        turned = f"angle median {angle.median:.3g}°, max {angle.max:.3g}°"
+        yield f"elbows    {off}, {turned}, within 5 % and 1° {outcome.fittings.good_elbows:.4f}"
+
+
+def _run_lines(outcome: Evaluation) -> Iterator[str]:
+    """Yield a line about the pairs of straights in one run."""
+    if outcome.runs is not None:
+        score = outcome.runs
+        pairs = f"pairs {score.pairs_truth}, found {score.pairs_predicted}, matched {score.pairs_matched}"
+        yield f"runs      truth {score.truth}, found {score.predicted}, {pairs}, {_rates(score)}"
+
+
+def _rates(score: KindScore | RunScore) -> str:
+    return f"precision {score.precision:.4f}, recall {score.recall:.4f}, F1 {score.f1:.4f}"
 
 
 def _statistics(spread: object) -> list[tuple[str, float]]:

@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     help="Write the cylinders as a mesh: .ply, .obj, .glb or .stl, or a folder for an .obj. Needs trimesh.",
 )
 @units_option("a mesh that is .glb needs")
+@click.option("--runs", is_flag=True, help="Join the cylinders to runs of pipe by elbows, tees and other fittings.")
 @configured
 @selecting
 @click.option("--threads", type=click.IntRange(min=1), metavar="N", help="Threads to use.  [default: one per core]")
@@ -101,6 +102,7 @@ def extract(
     png: str | None,
     mesh: str | None,
     units: str | None,
+    runs: bool,
     settings: Config,
     selection: Selection,
     threads: int | None,
@@ -137,11 +139,11 @@ def extract(
     extras = [*(name for name in [profile] if name is not None), *(job.annotated for job in others if job.annotated)]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])
     run = Run(settings, threads, require, overwrite or options.resume, messages, selection)
-    run = replace(run, tiles=tiles, processes=options.tile_processes(), resume=options.resume, others=others)
+    run = replace(run, runs=runs, tiles=tiles, processes=options.tile_processes(), resume=options.resume, others=others)
     if tiles.certain:
         from cylx.cli.batch.tiled import check_tiles
 
-        check_tiles([*jobs, *others], settings, selection)
+        check_tiles([*jobs, *others], settings, selection, runs=runs)
     batch = Batch(run, jobs, options, summaries)
     with made_folder(output):
         check_outputs(jobs, [], overwrite=overwrite or options.resume)

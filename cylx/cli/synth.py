@@ -131,6 +131,37 @@ def multi(
     write_scene(out, scene, precision=precision, overwrite=overwrite, as_json=as_json)
 
 
+@synth.command(examples=["cylx synth piping plant.ply", "cylx synth piping plant.ply --runs 20 --scanners 3 --seed 7"])
+@click.argument("out", shell_complete=complete_files)
+@click.option("--points", type=int, help="Number of points.  [default: 50000 a run]")
+@click.option("--runs", type=int, default=5, show_default=True, help="Number of connected runs of pipes.")
+@click.option("--scanners", type=int, default=4, show_default=True, help="Number of places it is seen from: 1 to 8.")
+@click.option("--planes", type=int, default=2, show_default=True, help="Number of floor, walls, ceiling: 0 to 6.")
+@click.option("--noise", type=float, default=0.01, show_default=True, help="Share of points anywhere in the room.")
+@click.option("--sigma", type=float, default=0.002, show_default=True, help="Noise of points on surfaces.")
+@output_options
+def piping(
+    *,
+    out: str,
+    scale: float,
+    offset: tuple[float, ...],
+    precision: str,
+    overwrite: bool,
+    as_json: bool,
+    **parameters: Any,  # noqa: ANN401  the options of the scene, of many types
+) -> None:
+    """Make a room with runs of pipes: elbows, tees, reducers, flanges, valves, caps, insulation, supports.
+
+    OUT ends in .ply, .pcd or .xyz. The unit is metres; --scale 1000 turns them into millimetres. A point is there if at
+    least one scanner sees it. The truth also lists fittings and runs.
+    """
+    from cylx import synthetic
+
+    prepare(out, overwrite=overwrite)
+    scene = synthetic.piping(**parameters).moved(scale, offset)
+    write_scene(out, scene, precision=precision, overwrite=overwrite, as_json=as_json)
+
+
 def truth_path(out: str) -> str:
     """Return the name of the truth file of a cloud."""
     return str(Path(out).with_name(Path(out).stem + TRUTH))

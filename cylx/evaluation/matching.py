@@ -113,13 +113,13 @@ def read_cylinders(document: Mapping[str, object], place: str, key: str = "cylin
         here = f"{place}.{key}[{i}]"
         if not isinstance(entry, Mapping):
             raise InputError(here, "is not an object", "give each cylinder as an object with its keys")
-        vectors[0, i] = _vector(entry, "axis_point", here)
-        vectors[1, i] = _vector(entry, "axis_direction", here)
-        numbers[0, i] = _number(entry.get("radius"), f"{here}.radius")
+        vectors[0, i] = read_vector(entry, "axis_point", here)
+        vectors[1, i] = read_vector(entry, "axis_direction", here)
+        numbers[0, i] = read_number(entry.get("radius"), f"{here}.radius")
         for row, name in ((1, "height"), (2, "inliers")):
             if entry.get(name) is not None:
-                numbers[row, i] = _number(entry[name], f"{here}.{name}")
-        ids.append(_identity(entry.get("id", i), f"{here}.id"))
+                numbers[row, i] = read_number(entry[name], f"{here}.{name}")
+        ids.append(read_id(entry.get("id", i), f"{here}.id"))
         ignore[i] = bool(entry.get("ignore", False))
     with np.errstate(over="ignore", invalid="ignore"):  # a direction that is too long is unusable
         lengths = np.linalg.norm(vectors[1], axis=1, keepdims=True)
@@ -176,21 +176,24 @@ def match_one_to_one(cost: FloatArray, admissible: MaskArray) -> tuple[IndexArra
     return rows[kept], columns[kept]
 
 
-def _vector(entry: Mapping[str, object], key: str, here: str) -> list[float]:
+def read_vector(entry: Mapping[str, object], key: str, here: str) -> list[float]:
+    """Return the three numbers of a key; an InputError names the place."""
     value = entry.get(key)
     if not isinstance(value, list | tuple) or len(value) != 3:
         fault = "is missing" if key not in entry else "is not a list of three numbers"
         raise InputError(f"{here}.{key}", fault, "give three numbers")
-    return [_number(component, f"{here}.{key}[{i}]") for i, component in enumerate(value)]
+    return [read_number(component, f"{here}.{key}[{i}]") for i, component in enumerate(value)]
 
 
-def _number(value: object, place: str) -> float:
+def read_number(value: object, place: str) -> float:
+    """Return a number, infinite if it is too large for one; an InputError names the place."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise InputError(place, "is missing" if value is None else f"is not a number: {value!r}", "give a number")
     return float(value) if abs(value) < 1e300 or not isinstance(value, int) else math.inf
 
 
-def _identity(value: object, place: str) -> int:
+def read_id(value: object, place: str) -> int:
+    """Return a whole number; an InputError names the place."""
     if isinstance(value, bool) or not isinstance(value, int):
         raise InputError(place, f"is not a whole number: {value!r}", "give a whole number, or leave it out")
     return value

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, fields, replace
-from typing import Literal, NamedTuple
+from dataclasses import asdict, dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from cylx.errors import UsageError
+from cylx.evaluation.differences import Difference, Kind, List, Tolerances
 from cylx.evaluation.matching import (
     CylinderTable,
     PairErrors,
@@ -17,77 +17,13 @@ from cylx.evaluation.matching import (
     read_cylinders,
     require_usable,
 )
+from cylx.evaluation.piping_changes import PipingChanges, compare_piping
 from cylx.geometry.arrays import FloatArray
 
-Kind = Literal["missing", "extra", "moved", "resized", "recounted"]
-List = Literal["cylinders", "blends"]
-
+_DEFAULT = Tolerances()
 _SAME_ANGLE_DEG = 5.0  # within these limits two cylinders count as the same, with different parameters
 _SAME_OFFSET = 0.25
 _SAME_RADIUS = 0.15
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Tolerances:
-    """The allowed differences of two results.
-
-    Parameters
-    ----------
-    angle_deg : float
-        Angle between the axes, degrees.
-    offset : float
-        Distance of the axes at the middle of either cylinder, in radii.
-    radius : float
-        Of the radii, relative.
-    height : float
-        Of the heights, and of the mid-points along the axis, relative to the larger height plus radius.
-    inliers : float
-        Of the numbers of inliers, relative.
-    """
-
-    angle_deg: float = 0.1
-    offset: float = 0.01
-    radius: float = 0.005
-    height: float = 0.05
-    inliers: float = 0.05
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if not value >= 0:
-                raise UsageError(f"tolerance {field.name}", f"must be >= 0, not {value}", "give a number >= 0")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Difference:
-    """One difference of two results.
-
-    Parameters
-    ----------
-    kind : str
-        `missing` (only in a), `extra` (only in b), `moved`, `resized` or `recounted`.
-    id_a, id_b : int or None
-        The cylinder in a and in b.
-    what : str
-        `cylinder` or `blend` if one is missing or extra, or `angle_deg`, `offset`, `shift` (along the axis), `height`,
-        `radius` or `inliers`.
-    a, b : float or None
-        The values in a and b, if there are any; the radius of a missing or extra cylinder.
-    difference, tolerance : float or None
-        The difference and its tolerance, in the same unit.
-    of : str
-        The list they are in, `cylinders` or `blends`.
-    """
-
-    kind: Kind
-    id_a: int | None
-    id_b: int | None
-    what: str
-    a: float | None = None
-    b: float | None = None
-    difference: float | None = None
-    tolerance: float | None = None
-    of: List = "cylinders"
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +39,8 @@ class Comparison:
         results are the same.
     blends_a, blends_b, blends_matched : int
         Number of blends in a, in b, and in both.
+    piping : PipingChanges or None
+        Numbers of fittings and runs; None if neither result has any.
     """
 
     cylinders_a: int
@@ -112,6 +50,7 @@ class Comparison:
     blends_a: int = 0
     blends_b: int = 0
     blends_matched: int = 0
+    piping: PipingChanges | None = None
 
     @property
     def same(self) -> bool:
@@ -128,14 +67,16 @@ class Comparison:
             "blends_a": self.blends_a,
             "blends_b": self.blends_b,
             "blends_matched": self.blends_matched,
+            **({} if self.piping is None or self.piping.counts is None else self.piping.counts),
             "differences": [asdict(difference) for difference in self.differences],
         }
 
 
-def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tolerances = Tolerances()) -> Comparison:
+def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tolerances = _DEFAULT) -> Comparison:
     """Compare the cylinders of two results, in any order, and so their blends.
 
-    A result without a list of blends counts as one without blends.
+    A result without a list of blends counts as one without blends. If one of the results has fittings and runs, these
+    are compared, too: fittings of one kind at one place, and whether the same cylinders are joined.
 
     Heights and inliers are compared if both results have them. A difference equal to its tolerance is allowed.
 
@@ -153,14 +94,17 @@ def compare(a: Mapping[str, object], b: Mapping[str, object], *, tolerances: Tol
     """
     found = _compare_lists(a, b, "cylinders", tolerances)
     blends = _compare_lists(a, b, "blends", tolerances)
-    return Comparison(*found.counts, (*found.differences, *blends.differences), *blends.counts)
+    piping = compare_piping(a, b, found.same, tolerances)
+    differences = (*found.differences, *blends.differences, *piping.differences)
+    return Comparison(*found.counts, differences, *blends.counts, piping)
 
 
 class _Compared(NamedTuple):
-    """The numbers of entries in a, in b and in both, and the differences."""
+    """The numbers of entries in a, in b and in both, the differences, and ids in b by those in a."""
 
     counts: tuple[int, int, int]
     differences: list[Difference]
+    same: dict[int, int]
 
 
 def _compare_lists(a: Mapping[str, object], b: Mapping[str, object], of: List, tolerances: Tolerances) -> _Compared:
@@ -181,7 +125,8 @@ def _compare_lists(a: Mapping[str, object], b: Mapping[str, object], of: List, t
     for j in sorted(set(range(len(right))) - set(pairs.values())):
         new = float(right.radii[j])
         differences.append(Difference(kind="extra", id_a=None, id_b=right.ids[j], what=name, b=new))
-    return _Compared((len(left), len(right), len(pairs)), [replace(one, of=of) for one in differences])
+    same = {left.ids[i]: right.ids[j] for i, j in pairs.items()}
+    return _Compared((len(left), len(right), len(pairs)), [replace(one, of=of) for one in differences], same)
 
 
 def _mutual_errors(left: CylinderTable, right: CylinderTable) -> PairErrors:

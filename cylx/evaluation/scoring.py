@@ -8,7 +8,11 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from cylx.errors import UsageError
+from cylx.evaluation.fittings import FittingScores, score_fittings
 from cylx.evaluation.matching import match_one_to_one, pair_errors, read_cylinders, require_usable
+from cylx.evaluation.pieces import further_pieces, passed_through, read_pieces
+from cylx.evaluation.rates import Spread, rates, spread_of
+from cylx.evaluation.runs import RunScore, score_runs
 from cylx.geometry.arrays import MaskArray
 
 
@@ -36,15 +40,6 @@ class Match:
 
 
 @dataclass(frozen=True, slots=True)
-class Spread:
-    """The median, mean and maximum of an error over the matches."""
-
-    median: float
-    mean: float
-    max: float
-
-
-@dataclass(frozen=True, slots=True)
 class Evaluation:
     """The score of a result.
 
@@ -55,7 +50,8 @@ class Evaluation:
     duplicates : int
         Further cylinders of the result on a true one that is matched already; they count as false.
     ignored : int
-        Cylinders of the result on true ones that need not be found; they count neither as correct nor as false.
+        Cylinders of the result on true ones that need not be found, and further pieces of a true one that something
+        interrupts; they count neither as correct nor as false.
     unusable : int
         Entries of the result that are not cylinders (not finite, no direction); they are left out.
     precision, recall, f1 : float
@@ -68,6 +64,10 @@ class Evaluation:
         `id` of true cylinders without a match.
     false : tuple of int
         `id` of cylinders in the result without a match, duplicates included.
+    fittings : FittingScores or None
+        None unless both the truth and the result list `fittings`.
+    runs : RunScore or None
+        None unless both list `runs`.
     """
 
     truth: int
@@ -85,10 +85,16 @@ class Evaluation:
     pairs: tuple[Match, ...]
     missed: tuple[int, ...]
     false: tuple[int, ...]
+    fittings: FittingScores | None = None
+    runs: RunScore | None = None
 
     def to_dict(self) -> dict[str, object]:
-        """Return everything as a JSON object, keys in the order above."""
-        return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(self).items()}
+        """Return everything as a JSON object, keys in the order above; `fittings` and `runs` only if they are known."""
+        told = asdict(self)
+        for name in ("fittings", "runs"):
+            if told[name] is None:
+                del told[name]
+        return {key: list(value) if isinstance(value, tuple) else value for key, value in told.items()}
 
 
 def evaluate(
@@ -103,7 +109,7 @@ def evaluate(
 
     A pair is admissible if its errors (see `Match`) are all below the given limits. The largest possible number of
     admissible pairs is matched, at the least sum of errors over limits. True cylinders marked `ignore` need not be
-    found.
+    found. If both list `fittings`, these are scored, too (see `FittingScores`), and so are `runs` (see `RunScore`).
 
     Parameters
     ----------
@@ -139,6 +145,12 @@ def evaluate(
 
     unmatched = np.ones(len(found), dtype=bool)
     unmatched[columns] = False
+    on_true = dict(zip(columns.tolist(), rows.tolist(), strict=True))
+    pieces, near = read_pieces(truth, "truth"), admissible & asked[:, None]
+    asked &= ~passed_through(known, found, pieces, near, on_true)
+    further = further_pieces(known, found, pieces, near, on_true)
+    on_true |= further
+    unmatched[list(further)] = False
     duplicate = unmatched & admissible[asked].any(axis=0)
     ignored = unmatched & ~duplicate & admissible[known.ignore].any(axis=0)
     missed = asked.copy()
@@ -148,36 +160,26 @@ def evaluate(
         Match(known.ids[i], found.ids[j], *(float(e[i, j]) for e in (errors.angle_deg, errors.offset, errors.radius)))
         for i, j in zip(rows, columns, strict=True)
     )
-    precision, recall, f1 = _rates(len(pairs), int(false.sum()), int(missed.sum()))
+    precision, recall, f1 = rates(len(pairs), int(false.sum()), int(missed.sum()))
     return Evaluation(
         truth=int(asked.sum()),
         predicted=len(found),
         matched=len(pairs),
         duplicates=int(duplicate.sum()),
-        ignored=int(ignored.sum()),
+        ignored=int(ignored.sum()) + len(further),
         unusable=len(given) - len(found),
         precision=precision,
         recall=recall,
         f1=f1,
-        angle_deg=_spread([pair.angle_deg for pair in pairs]),
-        offset=_spread([pair.offset for pair in pairs]),
-        radius=_spread([pair.radius for pair in pairs]),
+        angle_deg=spread_of([pair.angle_deg for pair in pairs]),
+        offset=spread_of([pair.offset for pair in pairs]),
+        radius=spread_of([pair.radius for pair in pairs]),
         pairs=pairs,
         missed=_chosen(known.ids, missed),
         false=_chosen(found.ids, false),
+        fittings=score_fittings(truth, result, known, radius),
+        runs=score_runs(truth, result, {found.ids[j]: known.ids[i] for j, i in on_true.items()}),
     )
-
-
-def _rates(matched: int, false: int, missed: int) -> tuple[float, float, float]:
-    if not matched + false + missed:
-        return 1.0, 1.0, 1.0
-    precision = matched / (matched + false) if matched + false else 0.0
-    recall = matched / (matched + missed) if matched + missed else 0.0
-    return precision, recall, 2 * matched / (2 * matched + false + missed)
-
-
-def _spread(values: list[float]) -> Spread | None:
-    return Spread(float(np.median(values)), float(np.mean(values)), max(values)) if values else None
 
 
 def _chosen(ids: tuple[int, ...], mask: MaskArray) -> tuple[int, ...]:

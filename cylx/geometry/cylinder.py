@@ -79,6 +79,18 @@ class Cylinder:
         )
 
 
+def cylinder_between(start: ArrayLike, end: ArrayLike, radius: float) -> Cylinder:
+    """Return the cylinder with the given ends of its axis.
+
+    Raises
+    ------
+    ValueError
+        If the ends are one point, or the radius is not > 0.
+    """
+    first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    return Cylinder(0.5 * (first + last), last - first, radius, float(np.linalg.norm(last - first)))
+
+
 def canonical_direction(direction: ArrayLike) -> FloatArray:
     """Return the unit vector along `direction` whose component of largest magnitude is positive.
 

@@ -35,10 +35,13 @@ _TRIED = 3
 _MOST_STEPS = 4.0
 """A coordinate in double precision may be off by this many steps of its file."""
 _OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "blue": "u1"}
+_OF_RUNS = {"fitting_id": "<i4", "run_id": "<i4"}
 
 
 def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool = False) -> None:
     """Write all points of the input with all their properties, and the cylinder of each.
+
+    If runs were looked for, each point also has its `fitting_id` and `run_id` (int, -1 for none).
 
     Every row of the input is written, unchanged and in its order, including points without finite coordinates and
     points that were not used. The properties added are `cylinder_id` (int, -1 for none), `residual` (float, the signed
@@ -71,8 +74,9 @@ def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool
         if suffix in LAS_SUFFIXES:
             _write_las(file, extraction, compressed=suffix == ".laz")
             return
-        kept = _kept(None if cloud.table is None else cloud.table.dtype)
-        dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OURS.items()])
+        ours = _OURS if extraction.piping is None else _OURS | _OF_RUNS
+        kept = _kept(None if cloud.table is None else cloud.table.dtype, ours)
+        dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *ours.items()])
         if suffix == ".pcd":
             write_pcd(file, np.concatenate([*_blocks(extraction, kept, dtype)]))
         else:
@@ -131,10 +135,10 @@ def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
         if np.spacing(max(np.abs(table[axis]).max(), abs(offset))) > _MOST_STEPS * abs(scale):
             return f"the steps of {axis}, {scale:g}, are lost so far from the origin"
     few = table[:_TRIED]
-    ours = {name: np.zeros(len(few), kind) for name, kind in _OURS.items()}
+    ours = {name: np.zeros(len(few), kind) for name, kind in (_OURS | _OF_RUNS).items()}
     compressed, colored = suffix == ".laz", has_colors(few)
     try:
-        write_las(io.BytesIO(), header, len(few), [(few, ours)], colored=colored, compressed=compressed)
+        write_las(io.BytesIO(), header, len(few), [(few, ours)], colored=colored, compressed=compressed, runs=True)
     except MemoryError:
         raise
     except Exception as error:  # noqa: BLE001  laspy raises whatever it meets
@@ -143,18 +147,18 @@ def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
     return ""
 
 
-def _kept(dtype: np.dtype[np.void] | None) -> dict[str, tuple[str, np.dtype[Any]]]:
+def _kept(dtype: np.dtype[np.void] | None, ours: Mapping[str, str] = _OURS) -> dict[str, tuple[str, np.dtype[Any]]]:
     """Return the output name and type of each property of the input, by its input name."""
     if dtype is None:
         return {axis: (axis, np.dtype("<f8")) for axis in "xyz"}
     names = dtype.names or ()
     mended = mended_names(names)
-    taken = {*mended, *_OURS}
+    taken = {*mended, *ours}
     colored = {"red", "green", "blue"} <= set(mended)
     kept = {}
     for name, new in zip(names, mended, strict=True):
         renamed = new
-        if new in _OURS or (new == "alpha" and colored):
+        if new in ours or (new == "alpha" and colored):
             while renamed in taken:
                 renamed = f"orig_{renamed}"
             taken.add(renamed)
@@ -182,9 +186,15 @@ def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray
     cloud = extraction.cloud
     labels = cloud.spread(extraction.labels, -1)
     residuals = cloud.spread(extraction.residuals, np.nan)
+    piping = extraction.piping
+    of_runs = {}
+    if piping is not None:
+        fittings = piping.labels if len(piping.labels) else np.full(len(extraction.labels), -1, np.int32)
+        known = {"fitting_id": fittings, "run_id": piping.run_ids(extraction.labels)}
+        of_runs = {name: cloud.spread(values, -1) for name, values in known.items()}
     for start in range(0, cloud.rows, ROWS_AT_A_TIME):
         part = slice(start, start + ROWS_AT_A_TIME)
-        yield part, _ours(labels[part], residuals[part])
+        yield part, _ours(labels[part], residuals[part]) | {name: ids[part] for name, ids in of_runs.items()}
 
 
 def _ours(ids: NDArray[np.int32], residuals: NDArray[np.float32]) -> dict[str, NDArray[Any]]:
@@ -252,7 +262,10 @@ def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> N
     if table is None:
         raise ValueError("only clouds from LAS and LAZ can be written as such")
     pieces = ((table[part], ours) for part, ours in _findings(extraction))
-    _write_las_pieces(file, cloud.source.header, len(table), pieces, colored=has_colors(table), compressed=compressed)
+    runs = extraction.piping is not None
+    _write_las_pieces(
+        file, cloud.source.header, len(table), pieces, colored=has_colors(table), compressed=compressed, runs=runs
+    )
 
 
 def _write_las_pieces(
@@ -263,6 +276,7 @@ def _write_las_pieces(
     *,
     colored: bool,
     compressed: bool,
+    runs: bool = False,
 ) -> None:
     """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek, or has to be read again."""
     from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
@@ -271,9 +285,9 @@ def _write_las_pieces(
     if header is None:
         raise ValueError("only clouds from LAS and LAZ can be written as such")
     if file.seekable() and not has_letters(header):
-        write_las(file, header, count, pieces, colored=colored, compressed=compressed)
+        write_las(file, header, count, pieces, colored=colored, compressed=compressed, runs=runs)
         return
     with tempfile.TemporaryFile() as copy:
-        write_las(copy, header, count, pieces, colored=colored, compressed=compressed)
+        write_las(copy, header, count, pieces, colored=colored, compressed=compressed, runs=runs)
         copy.seek(0)
         shutil.copyfileobj(copy, file)

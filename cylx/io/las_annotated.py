@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _OURS = {"cylinder_id": "i4", "residual": "f4"}
+_OF_RUNS = {"fitting_id": "i4", "run_id": "i4"}
 _NOT_KEPT = ("copc", "cylx_unused")
 _COLORS = ("red", "green", "blue")
 _FULL = 257  # colours of LAS have 16 bits
@@ -31,6 +32,7 @@ def write_las(
     *,
     colored: bool,
     compressed: bool,
+    runs: bool = False,
 ) -> None:
     """Write the points of a LAS file again, with the cylinder of each.
 
@@ -51,13 +53,16 @@ def write_las(
         Whether the points have colours that are not all 0.
     compressed : bool
         Whether to write LAZ.
+    runs : bool
+        Whether the blocks have `fitting_id` and `run_id` as well.
     """
     import laspy  # noqa: PLC0415  an extra
 
+    kinds = _OURS | _OF_RUNS if runs else _OURS
     with quiet_laspy():
         header = laspy.LasHeader.read_from(io.BytesIO(mended(kept, count)), read_evlrs=True)
         columns = las_dimensions(header.point_format)
-        renamed = _prepare(header, colored=colored)
+        renamed = _prepare(header, kinds, colored=colored)
         with laspy.open(file, mode="w", header=header, closefd=False, do_compress=compressed) as writer:
             for rows, ours in blocks:
                 record = laspy.ScaleAwarePointRecord.zeros(len(rows), header=header)
@@ -69,7 +74,7 @@ def write_las(
                     if f"{color}+" in renamed:
                         record[renamed[f"{color}+"]] = rows[color]
                     record[color] = ours[color].astype("u2") * _FULL
-                for name in _OURS:
+                for name in kinds:
                     record[name] = ours[name]
                 writer.write_points(record)
             if header.evlrs:
@@ -78,18 +83,18 @@ def write_las(
         restore(file, kept)
 
 
-def _prepare(header: Any, *, colored: bool) -> dict[str, str]:  # noqa: ANN401  (of laspy)
+def _prepare(header: Any, kinds: dict[str, str], *, colored: bool) -> dict[str, str]:  # noqa: ANN401  (of laspy)
     """Add our dimensions to a header, and return the new names of dimensions, those of colours under `red+`."""
     import laspy  # noqa: PLC0415  an extra
 
     point_format = header.point_format
-    taken = [*point_format.dimension_names, *_OURS]
+    taken = [*point_format.dimension_names, *kinds]
     renamed = {}
     for place, one in enumerate(point_format.dimensions):
-        if one.name in _OURS:
+        if one.name in kinds:
             renamed[one.name] = _new_name(one.name, taken)
             point_format.dimensions[place] = one._replace(name=renamed[one.name])
-    params = [laspy.ExtraBytesParams(name, kind) for name, kind in _OURS.items()]
+    params = [laspy.ExtraBytesParams(name, kind) for name, kind in kinds.items()]
     if _is_colored(header) and colored:
         renamed |= {f"{color}+": _new_name(color, taken) for color in _COLORS}
         params += [laspy.ExtraBytesParams(renamed[f"{color}+"], "u2") for color in _COLORS]

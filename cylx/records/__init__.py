@@ -19,6 +19,18 @@ from cylx.records.cylinders import (
     RejectedSegment,
     Segment,
 )
+from cylx.records.fittings import (
+    Cap,
+    Cross,
+    Elbow,
+    Fitting,
+    Flange,
+    Inline,
+    Joint,
+    Junction,
+    Reducer,
+)
+from cylx.records.piping import Adjustment, OpenEnd, PipeRun, PipeSize, Piping
 from cylx.records.progress import Observer, SilentObserver, StageReport
 from cylx.records.scales import CELL, Explained, Nearby, Scale
 from cylx.records.sources import Crop, Selection, Source
@@ -27,21 +39,35 @@ from cylx.records.tiled import TiledExtraction, Tiling
 
 __all__ = [
     "CELL",
+    "Adjustment",
     "Candidates",
+    "Cap",
     "Cluster",
     "Crop",
+    "Cross",
     "CylinderFit",
+    "Elbow",
     "EllipseFit",
     "Explained",
     "Extraction",
     "Finding",
+    "Fitting",
+    "Flange",
     "Frame",
     "IndexedCloud",
+    "Inline",
+    "Joint",
+    "Junction",
     "Nearby",
     "Noise",
     "NominalRadius",
     "Observer",
+    "OpenEnd",
+    "PipeRun",
+    "PipeSize",
+    "Piping",
     "PointCloud",
+    "Reducer",
     "RejectedFit",
     "RejectedSegment",
     "Scale",

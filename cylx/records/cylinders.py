@@ -14,6 +14,7 @@ from cylx.fits.nominal_radius import Choice, Decision
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, Cylinder
 from cylx.records.clouds import PointCloud, Scene
+from cylx.records.piping import Piping
 from cylx.records.progress import StageReport
 from cylx.records.shown import html_in_notebook
 from cylx.wording import counted
@@ -208,6 +209,8 @@ class CylinderFit:
         Deviation of the surface from a cylinder, that neighbouring points share, scene units; None if not measured.
     side : {'convex', 'concave', 'unknown'} or None
         That of a pin, that of a bore, or neither can be told; None if not measured.
+    measured : Cylinder or None
+        The shape as it was measured, if it was moved since, so that its run is as it was built.
     """
 
     cylinder: Cylinder
@@ -222,6 +225,7 @@ class CylinderFit:
     nominal: NominalRadius | None = None
     form: float | None = None
     side: Literal["convex", "concave", "unknown"] | None = None
+    measured: Cylinder | None = None
 
     @property
     def radius_sd(self) -> float | None:
@@ -280,6 +284,8 @@ class Extraction:
     blends : tuple of CylinderFit or None
         Arcs that go on tangentially: rounds, fillets, slot ends. Ordered as the cylinders; their inliers are the points
         that no cylinder has. None if they were not looked for.
+    piping : Piping or None
+        The fittings and runs of the cylinders; None if they were not looked for.
     """
 
     cylinders: tuple[CylinderFit, ...]
@@ -292,6 +298,7 @@ class Extraction:
     warnings: tuple[str, ...] = ()
     rejected: tuple[RejectedFit, ...] = ()
     blends: tuple[CylinderFit, ...] | None = None
+    piping: Piping | None = None
 
     def __repr__(self) -> str:
         return f"{counted(len(self.cylinders), len(self.blends or ()))} in {len(self.labels)} points"

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from cylx.results.cylinders import ResultBlend as ResultBlend
     from cylx.results.cylinders import ResultCylinder as ResultCylinder
     from cylx.results.cylinders import Uncertainty as Uncertainty
+    from cylx.results.fittings import ResultFitting as ResultFitting
+    from cylx.results.fittings import ResultRun as ResultRun
     from cylx.results.rejected import RejectedCylinder as RejectedCylinder
     from cylx.results.rejected import Rejections as Rejections
     from cylx.results.rejected import rejections_schema as rejections_schema
@@ -32,6 +34,8 @@ _HOMES = {
     "Result": "cylx.results.result",
     "ResultBlend": "cylx.results.cylinders",
     "ResultCylinder": "cylx.results.cylinders",
+    "ResultFitting": "cylx.results.fittings",
+    "ResultRun": "cylx.results.fittings",
     "SceneScale": "cylx.results.result",
     "Stage": "cylx.results.result",
     "Uncertainty": "cylx.results.cylinders",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import degrees, isfinite
+from math import atan2, degrees, isfinite, radians
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
 import numpy as np
@@ -12,6 +12,7 @@ from pydantic import Field
 from cylx.results.parts import Count, Length, Matrix, Number, Part, Vector, drop_missing, plain_numbers
 
 if TYPE_CHECKING:
+    from cylx.geometry.cylinder import Cylinder
     from cylx.records import CylinderFit
 
 Listed = TypeVar("Listed", bound="ResultCylinder")
@@ -56,6 +57,35 @@ class CatalogueMatch(Part):
     """Radius without the catalogue, scene units."""
     free_radius_sd: Length
     """Its standard deviation, scene units."""
+
+
+class MeasuredShape(Part):
+    """The shape of a cylinder as it was measured, before it was moved to fit its run."""
+
+    start: Vector
+    """Lower end, scene units."""
+    end: Vector
+    """Upper end, scene units."""
+    radius: Annotated[Number, Field(gt=0)]
+    """Scene units."""
+    shift: Length
+    """How far the middle of the cylinder was moved, scene units."""
+    turn_deg: Annotated[Number, Field(ge=0, le=180)]
+    """By how much its axis was turned, degrees."""
+
+    @classmethod
+    def of(cls, before: Cylinder, after: Cylinder) -> MeasuredShape:
+        """Describe a cylinder before it was moved."""
+        along = float((before.point - after.point) @ after.direction)
+        shift = float(np.linalg.norm(before.point - after.point - along * after.direction))
+        sine = float(np.linalg.norm(np.cross(before.direction, after.direction)))
+        return cls(
+            start=plain_numbers(before.start),
+            end=plain_numbers(before.end),
+            radius=before.radius,
+            shift=shift,
+            turn_deg=degrees(atan2(sine, abs(float(before.direction @ after.direction)))),
+        )
 
 
 class Numbered(Part):
@@ -131,18 +161,43 @@ class ResultCylinder(Measured, Numbered):  # the keys of the last base class com
 
     catalogue: CatalogueMatch | None = None
     """Its entry of the catalogue; absent without a catalogue, or if its uncertainty was not computed."""
+    measured: MeasuredShape | None = None
+    """The shape as it was measured; absent if it was not moved to fit its run."""
 
     @classmethod
     def of(cls: type[Listed], index: int, fit: CylinderFit) -> Listed:
         """Describe number `index` of a list of cylinders."""
         match = None if fit.nominal is None else CatalogueMatch.model_validate(fit.nominal, from_attributes=True)
-        return cls(id=index, **cls.keys_of(fit), catalogue=match)
+        before = None if fit.measured is None else MeasuredShape.of(fit.measured, fit.cylinder)
+        return cls(id=index, **cls.keys_of(fit), catalogue=match, measured=before)
 
     def to_object(self) -> dict[str, Any]:
         """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json")
         drop_missing([content, content["catalogue"] or {}])
         return content
+
+    def to_fit(self) -> CylinderFit:
+        """Return the cylinder as it was before it was written."""
+        from cylx.geometry.cylinder import Cylinder, cylinder_between  # noqa: PLC0415  brings numba
+        from cylx.records import CylinderFit, NominalRadius  # noqa: PLC0415  bring numba
+
+        match, before = self.catalogue, self.measured
+        return CylinderFit(
+            Cylinder(np.array(self.axis_point), np.array(self.axis_direction), self.radius, self.height),
+            self.inliers,
+            self.rmse,
+            radians(self.coverage_deg),
+            self.support,
+            self.payoff,
+            self.confidence,
+            dict(self.evidence or {}),
+            None if self.uncertainty is None else np.array(self.uncertainty.covariance),
+            None if match is None else NominalRadius(**match.model_dump()),
+            self.form,
+            self.side,
+            None if before is None else cylinder_between(before.start, before.end, before.radius),
+        )
 
 
 class ResultBlend(ResultCylinder):

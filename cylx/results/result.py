@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -18,13 +18,15 @@ from cylx.config import describe_fault
 from cylx.config.choices import Method
 from cylx.errors import InputError
 from cylx.results.cylinders import ResultBlend, ResultCylinder
+from cylx.results.fittings import AnyFitting, ResultAdjustment, ResultRun, fitting_of
 from cylx.results.parts import Count, Input, Length, Part, drop_missing, text_of
 from cylx.results.table import dataframe_of
 from cylx.version import __version__
 from cylx.wording import counted
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, Scene, StageReport, TiledExtraction
+    from cylx.records import CylinderFit, Extraction, Scene, StageReport, TiledExtraction
+    from cylx.records.piping import Piping
 
 
 class SceneScale(Part):
@@ -99,6 +101,12 @@ class Result(Part):
     """The cylinders; empty if there are none."""
     blends: list[ResultBlend] | None = None
     """Arcs that go on tangentially, with the keys of a cylinder; absent if they were not looked for."""
+    fittings: list[AnyFitting] | None = None
+    """What joins the cylinders: elbows, tees, reducers, flanges and more; absent if they were not looked for."""
+    runs: list[ResultRun] | None = None
+    """The cylinders that are joined, the longest run first; absent if they were not looked for."""
+    adjustments: list[ResultAdjustment] | None = None
+    """What moved so that the runs are as they were built, and what was refused; absent if that was not asked for."""
     warnings: list[str]
     """What a user should know before trusting the result."""
 
@@ -119,6 +127,7 @@ class Result(Part):
             The output of a run.
         """
         blends, tiling = extraction.blends, getattr(extraction, "tiling", None)
+        piping: Piping | None = getattr(extraction, "piping", None)
         return cls(
             cylx_version=__version__,
             input=Input.of(extraction),
@@ -127,10 +136,20 @@ class Result(Part):
             scene=SceneScale.of(extraction.scene),
             tiles=None if tiling is None else Tiles.model_validate(asdict(tiling)),
             stages=[_stage(report) for report in extraction.stages],
-            cylinders=[ResultCylinder.of(i, fit) for i, fit in enumerate(extraction.cylinders)],
             blends=None if blends is None else [ResultBlend.of(i, fit) for i, fit in enumerate(blends)],
             warnings=list(extraction.warnings),
+            **cls.lists_of(extraction.cylinders, piping),
         )
+
+    @staticmethod
+    def lists_of(cylinders: Sequence[CylinderFit], piping: Piping | None) -> dict[str, Any]:
+        """Return the keys of cylinders, and of their fittings and runs if these were looked for."""
+        fittings = None if piping is None else [fitting_of(i, one) for i, one in enumerate(piping.fittings)]
+        runs = None if piping is None else [ResultRun.of(i, run) for i, run in enumerate(piping.runs)]
+        listed = [ResultCylinder.of(i, fit) for i, fit in enumerate(cylinders)]
+        moved = None if piping is None else piping.adjustments
+        adjusted = None if moved is None else [ResultAdjustment.of(one) for one in moved]
+        return {"cylinders": listed, "fittings": fittings, "runs": runs, "adjustments": adjusted}
 
     @classmethod
     def parse(cls, mapping: Mapping[str, Any], place: str) -> Result:
@@ -184,6 +203,12 @@ class Result(Part):
         lists = {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
         if self.blends is not None:
             lists["blends"] = [blend.to_object() for blend in self.blends]
+        if self.fittings is not None:
+            lists["fittings"] = [fitting.to_object() for fitting in self.fittings]
+        if self.runs is not None:
+            lists["runs"] = [run.to_object() for run in self.runs]
+        if self.adjustments is not None:
+            lists["adjustments"] = [one.to_object() for one in self.adjustments]
         return content | lists
 
     def __repr__(self) -> str:

@@ -5,7 +5,19 @@ isotropic Gaussian noise, and come in random order.
 """
 
 from cylx.synthetic.paper import single
+from cylx.synthetic.plant import piping
 from cylx.synthetic.room import multi
+from cylx.synthetic.runs import TrueFitting, TrueRun
 from cylx.synthetic.scene import NOISE, OTHER_SURFACE, SyntheticScene, TrueCylinder
 
-__all__ = ["NOISE", "OTHER_SURFACE", "SyntheticScene", "TrueCylinder", "multi", "single"]
+__all__ = [
+    "NOISE",
+    "OTHER_SURFACE",
+    "SyntheticScene",
+    "TrueCylinder",
+    "TrueFitting",
+    "TrueRun",
+    "multi",
+    "piping",
+    "single",
+]

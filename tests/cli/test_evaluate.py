@@ -50,6 +50,32 @@ def test_it_says_how_good_a_result_is(run_cylx, files):
     ]
 
 
+def test_fittings_and_runs_have_lines_of_their_own(run_cylx, files):
+    bend = {
+        "kind": "elbow",
+        "joins": [0, 1],
+        "center": [0, 3, 0],
+        "start": [0, 0, 0],
+        "end": [3, 3, 0],
+        "normal": [0, 0, 1],
+        "radius": 1,
+    }
+    for path, radius, angle in ((files[0], 3.03, 90.5), (files[1], 3, 90)):
+        content = json.loads(path.read_bytes())
+        fittings = [
+            {**bend, "bend_radius": radius, "angle_deg": angle},
+            {"kind": "cap", "joins": [2], "center": [9, radius, 9]},
+        ]
+        path.write_text(json.dumps({**content, "fittings": fittings, "runs": [{"cylinders": [0, 1]}]}))
+    lines = run_cylx("evaluate", *files).stdout.splitlines()
+    assert lines[7:] == [
+        "elbow     truth 1, found 1, matched 1, ignored 0, precision 1.0000, recall 1.0000, F1 1.0000",
+        "cap       truth 1, found 1, matched 1, ignored 0, precision 1.0000, recall 1.0000, F1 1.0000",
+        "elbows    bend radius median 0.01, max 0.01, angle median 0.5°, max 0.5°, within 5 % and 1° 1.0000",
+        "runs      truth 1, found 1, pairs 1, found 1, matched 1, precision 1.0000, recall 1.0000, F1 1.0000",
+    ]
+
+
 def test_json_has_all_there_is(run_cylx, files):
     content = json.loads(run_cylx("evaluate", *files, "--json", "--min-f1", 0.9).stdout)
     assert content.pop("bars_missed") == ["f1 0.666667 is below --min-f1 0.9"]

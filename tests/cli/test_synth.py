@@ -110,7 +110,16 @@ def test_an_unknown_suffix_is_refused(run_cylx, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("kind", ["single", "multi"])
+def test_piping_lists_fittings_and_runs(run_cylx, tmp_path):
+    options = ["--runs", 2, "--scanners", 3, "--planes", 1, "--noise", 0.02, "--sigma", 0.001, "--seed", 5]
+    done = run_cylx("synth", "piping", tmp_path / "plant.ply", "--points", 2000, *options, "--scale", 1000)
+    assert (done.exit_code, done.stdout, done.stderr) == (0, "", "")
+    scene = synthetic.piping(points=2000, runs=2, scanners=3, planes=1, noise=0.02, sigma=0.001, seed=5).moved(1000)
+    assert np.array_equal(read_cloud(tmp_path / "plant.ply").points, scene.points)
+    assert json.loads((tmp_path / "plant.truth.json").read_bytes()) == scene.truth()
+
+
+@pytest.mark.parametrize("kind", ["single", "multi", "piping"])
 def test_the_defaults_are_those_of_the_library(kind):
     options = {option.name: option.default for option in synth.commands[kind].params}
     library = {
@@ -119,6 +128,8 @@ def test_the_defaults_are_those_of_the_library(kind):
     if kind == "multi":
         assert options.pop("radius") == f"{library.pop('radius_min')}:{library.pop('radius_max')}"
         assert library.pop("room") is None
+    if kind == "piping":
+        assert library.pop("points") is None
     assert {name: options[name] for name in library} == library
 
 

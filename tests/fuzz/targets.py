@@ -173,6 +173,10 @@ def evaluate(data):
     truth = read_json(SEEDS / "truth" / "two.json")
     evaluation.evaluate(read_json(SCRATCH.put("truth.json", data)), truth)
     evaluation.evaluate(truth, read_json(SCRATCH.put("truth.json", data)))
+    piping = read_json(SEEDS / "truth" / "piping.json")
+    outcome = evaluation.evaluate(piping, read_json(SCRATCH.put("truth.json", data)))
+    json.dumps(outcome.to_dict(), allow_nan=False)
+    evaluation.evaluate(read_json(SCRATCH.put("truth.json", data)), piping)
 
 
 def compare(data):

@@ -10,7 +10,11 @@ MAY_IMPORT = {
         "api", "config", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional", "palette",
         "pipeline", "records", "report", "results", "scene", "synthetic", "tiles", "version", "wording",
     },
-    "api": {"config", "evaluation", "geometry", "io", "pipeline", "records", "results", "scene", "stages", "tiles"},
+    "api": {
+        "config", "evaluation", "fits", "geometry", "io", "pipeline", "records", "results", "runs", "scene", "stages",
+        "tiles",
+    },
+    "runs": {"fits", "geometry", "records"},
     "tiles": {"config", "errors", "geometry", "io", "optional", "pipeline", "records", "scene"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
@@ -24,7 +28,7 @@ MAY_IMPORT = {
     "scene": {"config", "errors", "fits", "geometry", "records"},
     "game": {"geometry", "records"},
     "baselines": {"config", "errors", "fits", "geometry", "optional", "records"},
-    "results": {"config", "errors", "harmless", "optional", "records", "version", "wording"},
+    "results": {"config", "errors", "geometry", "harmless", "optional", "records", "version", "wording"},
     "io": {"errors", "optional", "palette", "records"},
     "evidence": {"geometry", "records"},
     "records": {"config", "fits", "geometry", "wording"},

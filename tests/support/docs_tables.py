@@ -177,8 +177,10 @@ def parts_of(schema):
 
 def type_of(entry):
     """Name the type of a value in a JSON file."""
-    if "anyOf" in entry:
-        return " or ".join(type_of(choice) for choice in entry["anyOf"] if choice.get("type") != "null")
+    if "anyOf" in entry or "oneOf" in entry:
+        return " or ".join(
+            type_of(choice) for choice in entry.get("anyOf") or entry["oneOf"] if choice.get("type") != "null"
+        )
     if "$ref" in entry:
         name = entry["$ref"].rpartition("/")[2]
         return f"[{name}](#{name.lower()})"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from cylx.errors import UsageError
 from cylx.geometry.cylinder import cylinder_coordinates, surface_distances
-from cylx.synthetic import NOISE, OTHER_SURFACE, multi, single
+from cylx.synthetic import NOISE, OTHER_SURFACE, multi, piping, single
 from cylx.synthetic.placement import segment_distances
 from cylx.synthetic.surfaces import Box, Frustum, Sphere, Wall
 
@@ -133,7 +133,7 @@ def test_segment_distance_is_the_least_over_both_segments(seed, n):
 
 
 def test_a_seed_gives_one_scene_and_another_seed_another():
-    for family in (single, multi):
+    for family in (single, multi, piping):
         first, again, other = family(points=500, seed=7), family(points=500, seed=7), family(points=500, seed=8)
         assert np.array_equal(first.points, again.points)
         assert first.truth() == again.truth()
@@ -162,7 +162,7 @@ def test_the_truth_is_json_and_has_the_keys_of_a_truth():
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize("family", [single, multi])
+@pytest.mark.parametrize("family", [single, multi, piping])
 def test_the_params_make_the_scene_again(family):
     scene = family(points=300, seed=4, sigma=0.005)
     again = family(seed=scene.seed, sigma=scene.sigma, **scene.params)

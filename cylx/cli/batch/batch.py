@@ -150,6 +150,8 @@ class Batch:
     def _finished_before(self, job: Job) -> Finished | None:
         whole = self.options.resume and not self.run.others
         result = finished_before(job, self.run.settings, self.run.selection) if whole else None
+        if result is not None and self.run.runs != (result.runs is not None):
+            return None
         if result is None:
             return None
         blends = len(result.blends or ())

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cylx.cli.terminal.display import Messages, show_table
 from cylx.cli.terminal.failures import tell
-from cylx.wording import counted
+from cylx.wording import counted, piping_counted
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
@@ -22,6 +22,9 @@ def report(messages: Messages, job: Job, extraction: Extraction | TiledExtractio
         return
     fits = extraction.cylinders
     tell(found_line(job, len(fits), len(extraction.blends or ())))
+    piping = getattr(extraction, "piping", None)
+    if piping is not None:
+        tell(piping_counted(len(piping.runs), [one.kind for one in piping.fittings]))
     for warning in extraction.warnings:
         tell(f"warning: {warning}")
     if messages.verbose:

@@ -45,6 +45,8 @@ class Run:
         Whether tiles of an earlier run are gone on with.
     others : tuple of Job
         Further files that are one cloud with the scan.
+    runs : bool
+        Whether the cylinders are joined to runs.
     """
 
     settings: Config
@@ -57,6 +59,7 @@ class Run:
     processes: int | None = None
     resume: bool = False
     others: tuple[Job, ...] = ()
+    runs: bool = False
 
     def extract_one(self, job: Job) -> Finished:
         """Read a scan, find its cylinders, write them, and report them.
@@ -73,7 +76,7 @@ class Run:
 
         if needs_tiles(job.scan, self.tiles):
             if not self.tiles.certain:
-                check_tiles([job], self.settings, self.selection)
+                check_tiles([job], self.settings, self.selection, runs=self.runs)
                 self.messages.say(why_tiles(job.scan, self.tiles))
             how = TiledRun(
                 self.settings,
@@ -91,6 +94,7 @@ class Run:
 
         collect_rarely()
         import_numba_without_blas()
+        from cylx.api.piping import find_runs
         from cylx.api.warmup import ask_between_kernels, compile_kernels
         from cylx.io import read_cloud
         from cylx.io.inputs import check_unchanged, stamp_of
@@ -106,6 +110,8 @@ class Run:
             job, notes = check_format(job, cloud, overwrite=self.overwrite)
             compile_kernels(observer)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)
+            if self.runs:
+                extraction = find_runs(extraction, observer=observer)
             check_unchanged(job.scan, stamp, cloud.source.sha256)
             with observed(observer, "writing"):
                 written = write_job(job, extraction, overwrite=self.overwrite)

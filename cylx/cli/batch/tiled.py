@@ -70,7 +70,7 @@ def why_tiles(scan: str, tiles: TileOptions) -> str:
     return f"{needed:.2g} GB would be needed and {available:.2g} GB are there: the scan is cut into tiles"
 
 
-def check_tiles(jobs: Sequence[Job], settings: Config, selection: Selection) -> None:
+def check_tiles(jobs: Sequence[Job], settings: Config, selection: Selection, *, runs: bool = False) -> None:
     """Refuse what cannot be had from tiles, before anything is computed.
 
     Raises
@@ -88,6 +88,7 @@ def check_tiles(jobs: Sequence[Job], settings: Config, selection: Selection) -> 
         "--report": any(job.report for job in jobs),
         "--png": any(job.picture for job in jobs),
         "--voxel": selection.voxel is not None,
+        "--runs": runs,
     }
     for option, given in wanted.items():
         if given:

@@ -1,0 +1,90 @@
+"""Runs: cylinders joined by their fittings, which are proposed by the axes and fitted to the points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cylx.fits.nominal_radius import Catalogue
+from cylx.geometry.arrays import FloatArray
+from cylx.records import CylinderFit
+from cylx.runs.adding import add_caps, add_collars, add_gaps, add_junctions, add_reducers
+from cylx.runs.answer import Traced, answer_of, in_order
+from cylx.runs.crossings import split_crossings
+from cylx.runs.elbows import add_bends, trim
+from cylx.runs.graph import find_runs
+from cylx.runs.onward import follow_ends
+from cylx.runs.parts import drop_parts
+from cylx.runs.pieces import settled
+from cylx.runs.pipes import Pipe, Surroundings
+from cylx.runs.roughness import is_rough
+from cylx.runs.tracing import Trace
+
+__all__ = ["Traced", "trace_runs"]
+
+ROUNDS = 3
+"""Times that fittings are looked for anew, with the pipes as they are between those found before."""
+
+
+def trace_runs(
+    fits: Sequence[CylinderFit],
+    points: FloatArray,
+    labels: NDArray[np.int32],
+    *,
+    spacing: float,
+    noise: float,
+    catalogue: Catalogue | None = None,
+    names: Sequence[str | None] = (),
+) -> Traced:
+    """Join the cylinders of a cloud to runs, and find and fit what joins them.
+
+    Parameters
+    ----------
+    fits : sequence of CylinderFit
+        The cylinders.
+    points : ndarray of shape (N, 3)
+        The cloud, scene units; without points the fittings are those that the axes tell.
+    labels : ndarray of shape (N,)
+        Cylinder of each point, -1 for none.
+    spacing, noise : float
+        Of the cloud, scene units.
+    catalogue : Catalogue, optional
+        Nominal radii, scene units: decided for all pipes of a size of a run together.
+    names : sequence of str or None
+        Names of its entries.
+
+    Returns
+    -------
+    Traced
+    """
+    near = Surroundings(points, labels, spacing, noise)
+    pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
+    pipes = split_crossings(settled(pipes, near), near)
+    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_other or is_rough(pipe, near))
+    trace = Trace(pipes, near, others=others)
+    add_bends(trace, near)
+    add_reducers(trace, near)
+    for _ in range(ROUNDS):
+        # straights that were found too long have bent with their fittings; those found along the runs are new
+        trace = Trace(trim(trace, near), near, others=others, followed=trace.followed)
+        add_bends(trace, near)
+        add_reducers(trace, near)
+        add_junctions(trace, near)
+        if not follow_ends(trace, near):
+            break
+        while follow_ends(trace, near):
+            pass
+    else:
+        add_junctions(trace, near)
+    add_collars(trace, near)
+    add_gaps(trace, near)
+    add_caps(trace, near)
+    trace = drop_parts(trace)
+    # a bend that was taken for two has both its pipes again
+    add_bends(trace, near)
+    add_reducers(trace, near)
+    trace = in_order(trace)
+    runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)
+    return answer_of(trace, runs, fits, near)

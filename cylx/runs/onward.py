@@ -1,0 +1,245 @@
+"""Along a run: what goes on from an end of a pipe, a bend into a pipe that was too short to be found alone."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import axis_basis
+from cylx.runs.bend import Bend
+from cylx.runs.bend_fit import Solved, refined
+from cylx.runs.bending import FittedBend, judged
+from cylx.runs.elbows import add_bends, add_fitted
+from cylx.runs.narrowing import narrowed
+from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
+from cylx.runs.tracing import Trace
+
+AHEAD = 14.0
+"""How far ahead is looked, in radii."""
+TURNS = 24
+"""Directions to which a bend is tried."""
+RADII = (1.3, 1.8, 2.2, 2.6, 3.0, 3.6, 4.4, 5.4, 6.6, 8.2, 10.0, 12.0)
+"""Bend radii that are tried, in radii of the pipe."""
+BEFORE = (-0.8, -0.3, 0.2)
+"""Where the bend is tried to begin, in radii from the end of the pipe."""
+STEP = 0.25
+"""Pieces of the centre line, in radii."""
+SHELL = 0.3
+"""Points within so many radii of the surface, but not on it, speak against it."""
+MOST_POINTS, MOST_IN_FIT = 500, 800
+FIRST, SECOND = 8, 3
+"""How many bends are tried with several angles, and how many are fitted."""
+LEAST_AHEAD = 12
+"""Free points just ahead of an end, without which nothing goes on there."""
+LEAST_SCORE = 25.0
+"""Log-likelihood ratio of a bend and a pipe against nothing of the kind."""
+LEAST_TURN = math.radians(10.0)
+LEAST_STRAIGHT = 0.5
+"""A pipe behind a bend is as long at least, in radii."""
+LEAST_ON_STRAIGHT = 8
+LOOSE_OFFSET, LOOSE_TILT = 0.2, 0.1
+"""What is known of a pipe before it is fitted: standard deviations, in radii and radians."""
+
+
+def follow_ends(trace: Trace, near: Surroundings) -> int:
+    """Follow the free ends of pipes into bends and further pipes; return how many pipes were added.
+
+    Parameters
+    ----------
+    trace : Trace
+        Gets the bends and pipes.
+    near : Surroundings
+    """
+    count = 0
+    if near.cells is None:
+        return count
+    for index in range(len(trace.pipes)):
+        for end in ENDS:
+            if index in trace.aside or (index, end) in trace.taken or (index, end) in trace.followed:
+                continue
+            trace.followed.add((index, end))
+            found = onward_bend(trace.pipes[index], index, end, len(trace.pipes), near)
+            if found is None:
+                other = narrowed(trace.pipes[index], end, near)
+                if other is not None:
+                    trace.pipes.append(other)
+                    near.label(near.on(other), other.label)
+                    count += 1
+            else:
+                pipe, bend = found
+                trace.pipes.append(pipe)
+                add_fitted(trace, [bend])
+                near.label(near.on(trace.pipes[-1]), pipe.label)
+                # it may end at a pipe that is known: that one need not be followed
+                add_bends(trace, near, frozenset({len(trace.pipes) - 1}))
+                count += 1
+    return count
+
+
+def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surroundings) -> tuple[Pipe, FittedBend] | None:
+    """Find the bend at an end of a pipe, and the pipe that goes on from there; None if there is none.
+
+    Parameters
+    ----------
+    pipe : Pipe
+    index : int
+        Its number.
+    end : {'start', 'end'}
+    number : int
+        Of the pipe that is found.
+    near : Surroundings
+    """
+    place, axis, radius = pipe.at(end), pipe.outward(end), pipe.radius
+    reach = AHEAD * radius
+    indices = near.about(place, axis, -1.0 * radius, reach, reach)
+    indices = indices[near.free(indices, (pipe.label,))]
+    points = near.points[indices]
+    away = points - place
+    heights = away @ axis
+    beside = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0))
+    ahead = (heights > 0.1 * radius) & (heights < 1.6 * radius) & (beside < 1.6 * radius)
+    if ahead.sum() < LEAST_AHEAD:
+        return None
+    some = points[:: max(1, len(points) // MOST_POINTS)]
+    best: tuple[float, Solved, Pipe, float] | None = None
+    for bend in _starts(pipe, place, axis, some, len(points) / max(len(some), 1)):
+        one = _refined(pipe, bend, points, near)
+        if one is not None and (best is None or one[0] > best[0]):
+            best = one
+    if best is None or best[0] < LEAST_SCORE:
+        return None
+    _, solved, loose, length = best
+    bend = solved.bend
+    first, last = turned(bend.end, bend.end + length * bend.second)
+    joined: End = "start" if float((last - first) @ bend.second) > 0 else "end"
+    covariance = loose.covariance.copy()
+    covariance[:4, :4] = solved.covariance[4:8, 4:8]
+    covariance[4, 4] = solved.covariance[8, 8]
+    found = replace(loose, start=first, end=last, radius=solved.radius, covariance=covariance)
+    along, distances = bend.coordinates(points)
+    beyond = (along > bend.length) & (along < bend.length + length)
+    if (beyond & (np.abs(distances - radius) < ON_SURFACE * pipe.spread)).sum() < LEAST_ON_STRAIGHT:
+        return None
+    fitted = judged((index, number), (end, joined), solved, indices, near, pipe.spread)
+    if fitted is None:
+        return None
+    # the new pipe is where the fit has it already
+    shifts = fitted.shifts.copy()
+    shifts[1] = 0.0
+    return found, replace(fitted, shifts=shifts)
+
+
+def _refined(
+    pipe: Pipe, bend: Bend, points: FloatArray, near: Surroundings
+) -> tuple[float, Solved, Pipe, float] | None:
+    """Fit a bend and the pipe behind it; return its score, the fit, that pipe before it, and its length."""
+    radius, spread = pipe.radius, pipe.spread
+    loose, length = _next_pipe(pipe, bend, points, near)
+    if loose is None:
+        return None
+    _, distances = bend.coordinates(points)
+    about = points[np.abs(distances - radius) < max(SHELL * radius, 2.0 * ON_SURFACE * spread)]
+    some = about[:: max(1, len(about) // MOST_IN_FIT)]
+    solved = refined(bend, pipe, loose, radius, some, spread, 12, (0.0, length))
+    bend = solved.bend
+    if bend.angle < LEAST_TURN or bend.bend_radius > 1.2 * RADII[-1] * radius:
+        return None
+    length = _length_beyond(bend, radius, spread, points)
+    if length < LEAST_STRAIGHT * radius:
+        return None
+    return _score(bend, radius, spread, points, length), solved, loose, length
+
+
+def _starts(pipe: Pipe, place: FloatArray, axis: FloatArray, points: FloatArray, weight: float) -> list[Bend]:
+    """Return the best of many bends that begin at an end of a pipe."""
+    radius, spread = pipe.radius, pipe.spread
+    first, second = axis_basis(axis)
+    away = points - place
+    x, a, b = away @ axis, away @ first, away @ second
+    shell = max(SHELL * radius, 2.0 * ON_SURFACE * spread)
+    ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * spread))
+    pieces = int(AHEAD / STEP)
+    found: list[tuple[float, float, float, float, float]] = []
+    for turn in np.arange(TURNS) * (2.0 * math.pi / TURNS):
+        inward, across = math.cos(turn) * a + math.sin(turn) * b, math.cos(turn) * b - math.sin(turn) * a
+        for bend_radius in RADII:
+            size, best = bend_radius * radius, (-math.inf, 0.0, 0.0)
+            for before in BEFORE:
+                ahead = x - before * radius
+                y = size - inward
+                along = size * np.arctan2(ahead, y)
+                errors = np.abs(np.hypot(np.hypot(ahead, y) - size, across) - radius)
+                counted = (errors < shell) & (along > 0.0) & (along < 2.2 * size)
+                gain = np.maximum(ratio - 0.5 * (errors[counted] / spread) ** 2, -ratio)
+                rows = np.minimum((along[counted] / (STEP * radius)).astype(np.int64), pieces - 1)
+                total = np.cumsum(np.bincount(rows, weights=gain, minlength=pieces))
+                most = int(total.argmax())
+                best = max(best, (float(total[most]), before, (most + 1) * STEP * radius / size))
+            found.append((best[0], float(turn), best[1], size, best[2]))
+    found.sort(reverse=True)
+    tried: list[tuple[float, float, float, Bend]] = []
+    for score, turn, before, size, angle in found[:FIRST]:
+        if score * weight < LEAST_SCORE:
+            break
+        inward = math.cos(turn) * first + math.sin(turn) * second
+        start = place + before * radius * axis
+        angles = np.concatenate([np.linspace(0.35, 1.15, 9) * angle, [math.pi / 4.0, math.pi / 2.0]])
+        best_of: tuple[float, float, float, Bend] | None = None
+        for some in angles[(angles >= LEAST_TURN) & (angles <= 0.9 * math.pi)]:
+            onward = math.cos(some) * axis + math.sin(some) * inward
+            bend = Bend(start + size * math.tan(0.5 * some) * axis, axis, onward, size)
+            length = _length_beyond(bend, radius, spread, points)
+            one = (_score(bend, radius, spread, points, length), turn, size, bend)
+            best_of = one if best_of is None or one[0] > best_of[0] else best_of
+        if best_of is not None:
+            tried.append(best_of)
+    tried.sort(key=lambda one: -one[0])
+    return [one[3] for one in tried[:SECOND]]
+
+
+def _gains(bend: Bend, radius: float, spread: float, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where along a bend the points near its surface are, and how much each speaks for it."""
+    along, distances = bend.coordinates(points)
+    errors = np.abs(distances - radius)
+    shell = max(SHELL * radius, 2.0 * ON_SURFACE * spread)
+    counted = (errors < shell) & (along > 0.0)
+    ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * spread))
+    return along[counted], np.maximum(ratio - 0.5 * (errors[counted] / spread) ** 2, -ratio)
+
+
+def _length_beyond(bend: Bend, radius: float, spread: float, points: FloatArray) -> float:
+    """Return how long the pipe behind a bend is, by the points that speak for it."""
+    along, gains = _gains(bend, radius, spread, points)
+    beyond = along > bend.length
+    if not beyond.any():
+        return 0.0
+    heights, gains = along[beyond] - bend.length, gains[beyond]
+    order = np.argsort(heights, kind="stable")
+    heights, total = heights[order], np.cumsum(gains[order])
+    # a pipe ends at a hole that is longer than its diameter
+    holes = np.flatnonzero(np.diff(np.concatenate([[0.0], heights])) > 3.0 * radius)
+    last = int(holes[0]) if len(holes) else len(heights)
+    if last == 0 or total[:last].max() <= 0:
+        return 0.0
+    return float(heights[int(total[:last].argmax())])
+
+
+def _score(bend: Bend, radius: float, spread: float, points: FloatArray, length: float) -> float:
+    """Return how much the points speak for a bend and a pipe of a length behind it."""
+    along, gains = _gains(bend, radius, spread, points)
+    return float(gains[along < bend.length + length].sum())
+
+
+def _next_pipe(pipe: Pipe, bend: Bend, points: FloatArray, near: Surroundings) -> tuple[Pipe | None, float]:
+    """Return the pipe behind a bend, before it is fitted, and its length."""
+    radius = pipe.radius
+    length = _length_beyond(bend, radius, pipe.spread, points)
+    if length < 0.5 * LEAST_STRAIGHT * radius:
+        return None, 0.0
+    first, last = turned(bend.end, bend.end + length * bend.second)
+    offset, tilt = (LOOSE_OFFSET * radius) ** 2, LOOSE_TILT**2
+    covariance = np.diag([offset, offset, tilt, tilt, max(float(pipe.covariance[4, 4]), (0.005 * radius) ** 2)])
+    return Pipe(first, last, radius, pipe.spread, covariance, near.new_label()), length

@@ -1,0 +1,88 @@
+"""Pipes that are parts of fittings, such as the rims of flanges: they are no pipes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from cylx.geometry.arrays import FloatArray
+from cylx.records import Elbow, Flange, Inline, Junction
+from cylx.runs.pipes import Pipe
+from cylx.runs.tracing import Trace
+from cylx.runs.wider import LONGEST_RIM
+
+WITHIN = 0.5
+"""A piece of an elbow that was found as a cylinder has its axis within so many radii of the centre line."""
+LEAST_LEFT, LEAST_POINTS = 0.7, 8
+"""A pipe that was found along a run has a length of so many radii, and so many points, in the end."""
+
+
+def drop_parts(trace: Trace) -> Trace:
+    """Return what was traced without the pipes that are parts of fittings, such as the rims of flanges."""
+    joined = {pipe for fitting in trace.fittings for pipe in fitting.joins if fitting.kind not in _OF_ONE}
+    parts = {k for k in trace.aside if trace.pipes[k].length < LONGEST_RIM * trace.pipes[k].radius} - joined
+    for fitting in trace.fittings:
+        if isinstance(fitting, Flange | Inline):
+            axis = trace.pipes[fitting.joins[0]].direction
+            low, high, reach = _extent_of(fitting, axis)
+            for k, pipe in enumerate(trace.pipes):
+                if k in fitting.joins or k in joined:
+                    continue
+                away = pipe.middle - 0.5 * (low + high)
+                along = float(away @ axis)
+                beside = float(np.linalg.norm(away - along * axis))
+                inside = abs(along) + 0.4 * pipe.length < 0.5 * float(np.linalg.norm(high - low)) + 0.3 * reach
+                if inside and beside + pipe.radius < 1.15 * reach:
+                    parts.add(k)
+    for fitting in trace.fittings:
+        if isinstance(fitting, Elbow) and fitting.bend_radius > 0:
+            parts |= {k for k, pipe in enumerate(trace.pipes) if k not in joined and _is_within(pipe, fitting)}
+    parts |= {k for k, pipe in enumerate(trace.pipes) if _is_remnant(pipe, trace)}
+    kept = [k for k in range(len(trace.pipes)) if k not in parts]
+    number = {old: new for new, old in enumerate(kept)}
+    near = trace.near
+    for k in parts:
+        near.label(np.flatnonzero(near.labels == trace.pipes[k].label), -1)
+    others = frozenset(number[k] for k in trace.others if k in number)
+    out = Trace([trace.pipes[k] for k in kept], near, others=others, followed=set())
+    for fitting, points in zip(trace.fittings, trace.points, strict=True):
+        if parts.intersection(fitting.joins):
+            near.label(points, -1)
+            continue
+        moved = replace(fitting, joins=tuple(number[k] for k in fitting.joins))
+        if isinstance(moved, Junction):
+            main, branches = (tuple(number[k] for k in group) for group in (moved.main, moved.branches))
+            moved = replace(moved, main=main, branches=branches)
+        out.add(moved, points)
+    return out
+
+
+def _is_within(pipe: Pipe, elbow: Elbow) -> bool:
+    """Return whether a pipe is a piece of an elbow that was found as a cylinder."""
+    apart = np.array([pipe.start, pipe.middle, pipe.end]) - elbow.center
+    high = apart @ elbow.normal
+    out = np.sqrt(np.maximum(np.einsum("ij,ij->i", apart, apart) - high**2, 0.0))
+    radial = (elbow.start - elbow.center) / elbow.bend_radius
+    turn = np.arctan2(apart @ np.cross(elbow.normal, radial), apart @ radial)
+    on = np.hypot(out - elbow.bend_radius, high) < WITHIN * elbow.radius
+    slack = WITHIN * elbow.radius / elbow.bend_radius
+    return bool(on.all() and (turn > -slack).all() and (turn < elbow.angle + slack).all())
+
+
+def _is_remnant(pipe: Pipe, trace: Trace) -> bool:
+    """Return whether of a pipe that was found along a run hardly anything is left between its fittings."""
+    if pipe.source is not None:
+        return False
+    return pipe.length < LEAST_LEFT * pipe.radius or len(trace.near.on(pipe)) < LEAST_POINTS
+
+
+_OF_ONE = ("cap", "flange", "inline")
+
+
+def _extent_of(fitting: Flange | Inline, axis: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return both ends of a fitting on its axis, and how far it reaches from it."""
+    if isinstance(fitting, Flange):
+        half = 0.5 * fitting.thickness * axis
+        return fitting.center - half, fitting.center + half, fitting.radius
+    return fitting.start, fitting.end, 0.5 * float(np.linalg.norm(fitting.end - fitting.start))
