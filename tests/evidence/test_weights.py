@@ -9,8 +9,8 @@ from cylx.evidence.weights import BLEND_TERMS, TERMS, weigh, weigh_blend
 
 EDGE = dict(  # noqa: C408  keys without quotes read better
     scatter_radii=1 / 9, form_radii=0.0, roughness=1.0, noise_ratio=1.0, lack_of_fit=1.0, structure=0.0,
-    structure_radii=0.0, ovality=0.0, explained=0.0, facets=0.0, prism=0.0, deviation_radii=1 / 9, inside=0.0, outside=0.0,
-    tangent=0.0, tangent_both=0.0, flank=0.3, coverage=3.0, inliers=90.0, places=12.0, curvature=90.0,
+    structure_radii=0.0, ovality=0.0, explained=0.0, facets=0.0, prism=0.0, deviation_radii=1 / 9, inside=0.0,
+    outside=0.0, tangent=0.0, tangent_both=0.0, flank=0.3, coverage=3.0, inliers=90.0, places=12.0, curvature=90.0,
     radius_noises=9.0, height_radii=9.0, windows=20.0, payoff=0.8, agreement=0.8, slope=0.0, slope_error=0.01,
     bulge=0.0, bulge_error=0.01, bend=0.0, bend_error=0.01,
 )  # fmt: skip
