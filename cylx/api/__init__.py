@@ -149,13 +149,7 @@ def extract(
     check_tolerance(settings, options)
     chosen = None if classes is None else tuple(classes)
     selection = Selection(crop=crop, voxel=voxel, every=every, classes=chosen, scan=scan)
-    if isinstance(points_or_path, str | PathLike):
-        cloud = read_cloud(Path(points_or_path), scan=scan)
-    elif scan is not None:
-        raise ValueError("scan needs a file, and an array was given")
-    else:
-        given = points_or_path
-        cloud = given if isinstance(given, PointCloud) else PointCloud.from_array(given)
+    cloud = _cloud_of(points_or_path, scan)
     observer = observer or SilentObserver()
     compile_kernels(observer)
     found = extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
@@ -164,6 +158,15 @@ def extract(
     from cylx.api.piping import find_runs  # noqa: PLC0415  for this alone
 
     return find_runs(found, observer=observer)
+
+
+def _cloud_of(given: ArrayLike | PointCloud | str | PathLike[str], scan: int | None) -> PointCloud:
+    """Return the cloud that was given, in whatever form."""
+    if isinstance(given, str | PathLike):
+        return read_cloud(Path(given), scan=scan)
+    if scan is not None:
+        raise ValueError("scan needs a file, and an array was given")
+    return given if isinstance(given, PointCloud) else PointCloud.from_array(given)
 
 
 def read_result(path: str | PathLike[str]) -> Result:

@@ -20,7 +20,6 @@ from cylx.records.cylinders import (
     Segment,
 )
 from cylx.records.fittings import (
-    Adjustment,
     Cap,
     Cross,
     Elbow,
@@ -29,12 +28,9 @@ from cylx.records.fittings import (
     Inline,
     Joint,
     Junction,
-    OpenEnd,
-    PipeRun,
-    PipeSize,
-    Piping,
     Reducer,
 )
+from cylx.records.piping import Adjustment, OpenEnd, PipeRun, PipeSize, Piping
 from cylx.records.progress import Observer, SilentObserver, StageReport
 from cylx.records.scales import CELL, Explained, Nearby, Scale
 from cylx.records.sources import Crop, Selection, Source

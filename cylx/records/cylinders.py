@@ -14,7 +14,7 @@ from cylx.fits.nominal_radius import Choice, Decision
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, Cylinder
 from cylx.records.clouds import PointCloud, Scene
-from cylx.records.fittings import Piping
+from cylx.records.piping import Piping
 from cylx.records.progress import StageReport
 from cylx.records.shown import html_in_notebook
 from cylx.wording import counted

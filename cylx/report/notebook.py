@@ -114,7 +114,16 @@ def _glance(result: Result, view: View, most_points: int) -> dict[str, Any]:
     for cylinder in cylinders:
         cylinder.get("uncertainty", {}).pop("covariance", None)
     content = result.model_copy(
-        update={"cylinders": [], "blends": None, "stages": [], "warnings": [], "config": {}}
+        update={
+            "cylinders": [],
+            "blends": None,
+            "fittings": None,
+            "runs": None,
+            "adjustments": None,
+            "stages": [],
+            "warnings": [],
+            "config": {},
+        }
     ).to_object()
     return {
         "embedded": True,

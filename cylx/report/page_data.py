@@ -16,6 +16,7 @@ from cylx.report.points import choose_points, pack_labels, pack_residuals, quant
 from cylx.report.view import View
 from cylx.results import RejectedCylinder, Result
 from cylx.results.parts import drop_missing
+from cylx.results.quantities import quantities_of
 
 if TYPE_CHECKING:
     from cylx.records import Extraction
@@ -41,9 +42,10 @@ def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict
     dict
         A JSON object: `result`, as in the result file except for the configuration, which is the text `config`;
         `fields`, the properties of the input; the first `rejected`, of `rejected_count`; `view`, the drawing; `maps`,
-        the unrolled surface of each cylinder.
+        the unrolled surface of each cylinder; `parts`, the bill of quantities, None without runs.
     """
-    result = Result.of(extraction).to_object()
+    content = Result.of(extraction)
+    result = content.to_object()
     del result["config"]
     view = View.of(extraction)
     table = extraction.cloud.table
@@ -57,7 +59,22 @@ def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict
         "rejected_count": len(extraction.rejected),
         "view": view_of(view, most_points),
         "maps": maps_of(view),
+        "parts": None if content.runs is None else _parts(content),
     }
+
+
+def _parts(content: Result) -> dict[str, Any]:
+    """Return the list of parts as texts."""
+    rows = [
+        [_text(value) for value in (row["item"], row["size"], row["to_size"], row["angle_deg"], row["bend_radius"])]
+        + [str(row["count"]), _text(row["length"])]
+        for row in quantities_of(content)
+    ]
+    return {"heads": ["item", "size", "to size", "angle", "bend radius", "count", "length"], "lines": rows}
+
+
+def _text(value: str | float | None) -> str:
+    return "–" if value is None else value if isinstance(value, str) else f"{value:.4g}"  # noqa: RUF001  a dash
 
 
 def view_of(view: View, most_points: int) -> dict[str, Any]:
@@ -103,6 +120,11 @@ def view_of(view: View, most_points: int) -> dict[str, Any]:
         "palette": _packed(cylinder_colors(np.arange(len(shapes)))),
         "cylinders": np.array(tubes).tolist(),
         "blends": np.array(arcs).tolist(),
+        "runs": None if view.runs is None else list(view.runs),
+        "fittings": [
+            [owner, *(shape.start - middle).tolist(), *(shape.end - middle).tolist(), shape.radius]
+            for owner, shape in view.fittings
+        ],
     }
 
 

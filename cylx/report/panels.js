@@ -262,12 +262,41 @@ function makeSections() {
     blends.map((one) => [String(one.id), uncertain(one.radius, one.uncertainty?.radius), number(one.height),
       String(one.inliers), `${one.coverage_deg.toFixed(0)}°`, fraction(one.confidence), one.side ?? "–",
       vector(one.axis_point, 5)])));
+  if (result.runs) makeRuns();
   const some = facts.rejected.length < facts.rejected_count ? `the first ${facts.rejected.length} of ` : "";
   section(`Not accepted (${some}${facts.rejected_count})`, tableOf(
     ["reason", "radius", "height", "points", "coverage", "confidence", "middle"],
     facts.rejected.map((one) => [one.reason, number(one.radius), number(one.height), String(one.inliers),
       `${one.coverage_deg.toFixed(0)}°`, fraction(one.confidence), vector(one.axis_point, 5)])));
   section("Configuration", make("pre", {}, facts.config));
+}
+
+/** Show the runs, each of which can be shown alone, and the list of parts. */
+function makeRuns() {
+  const kinds = (run) => {
+    const counts = new Map();
+    for (const id of run.fittings) counts.set(result.fittings[id].kind, (counts.get(result.fittings[id].kind) ?? 0) + 1);
+    return [...counts].map(([kind, count]) => `${count} ${kind}`).join(", ");
+  };
+  const sizes = (run) => run.sizes.map((size) => size.nominal ?? number(2 * size.radius)).join(", ");
+  const ends = (run) => run.open_ends.map((one) => `${one.cylinder} ${one.reason.replaceAll("_", " ")}`).join(", ");
+  const lines = result.runs.map((run) => [String(run.id), number(run.length), sizes(run), run.cylinders.join(" "), kinds(run), ends(run)]);
+  const table = tableOf(["run", "length", "size", "cylinders", "fittings", "open ends"], lines);
+  table.querySelectorAll("tbody tr").forEach((row, place) => {
+    const cell = row.cells[0];
+    const button = make("button", { className: "choose", ariaLabel: `show run ${place} alone` }, cell.textContent);
+    button.addEventListener("click", () => showRun(result.runs[place]));
+    cell.replaceChildren(button);
+  });
+  section(`Runs (${result.runs.length})`, table, true);
+  section("Parts", tableOf(facts.parts.heads, facts.parts.lines));
+}
+
+/** Show the cylinders of one run and no others, and fly to the first. */
+function showRun(run) {
+  show(cylinders.map((one) => one.id), false);
+  show(run.cylinders, true);
+  select(run.cylinders[0], true);
 }
 
 // --- the view
@@ -289,7 +318,10 @@ function wire() {
     viewer.shown.dot = 2 ** Number(event.target.value);
     viewer.ask();
   });
-  byId("whole").addEventListener("click", () => viewer.fly());
+  byId("whole").addEventListener("click", () => {
+    show(cylinders.map((one) => one.id), true);
+    viewer.fly();
+  });
 }
 
 function recolor(coloring) {
@@ -312,6 +344,7 @@ function openView() {
     return;
   }
   if (!view.colors) byId("coloring").querySelector("[value=original]").remove();
+  if (!view.runs) byId("coloring").querySelector("[value=run]").remove();
   wire();
 }
 

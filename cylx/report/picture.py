@@ -56,7 +56,7 @@ def png_of(extraction: Extraction) -> bytes:
 
 
 def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> Figure:
-    """Draw points by cylinder, and the outlines of the cylinders, obliquely from above.
+    """Draw points by cylinder, or by run if there are runs, and the outlines of cylinders, obliquely from above.
 
     Parameters
     ----------
@@ -80,19 +80,25 @@ def plot_scene(found: Extraction | Result, cloud: PointCloud | ArrayLike | None 
     axes: Any = canvas.add_axes((0.02, 0.02, 0.94, 0.92), projection="3d", elev=ELEVATION, azim=AZIMUTH)
     chosen = choose_points(view.labels, MOST_POINTS, np.random.default_rng(view.seed))
     points, labels = view.points[chosen], view.labels[chosen]
+    # the last tone is what label -1 maps to
+    tones = np.array([*(range(len(view.shapes)) if view.runs is None else view.runs), -1])
     lines = [outline(shape) for shape in view.shapes]
     if len(points):
         low, high = np.quantile(points, (_OUTLYING, 1 - _OUTLYING), axis=0)
         shown = ((points >= low) & (points <= high)).all(axis=1) | (labels >= 0)
-        colors = np.column_stack([cylinder_colors(labels[shown]) / 255.0, np.where(labels[shown] < 0, 0.5, 0.9)])
+        colors = np.column_stack([cylinder_colors(tones[labels][shown]) / 255.0, np.where(labels[shown] < 0, 0.5, 0.9)])
         axes.scatter(*points[shown].T, c=colors, s=2.5, marker=".", linewidths=0, depthshade=False, rasterized=True)
         points = points[shown] if shown.any() else points
     elif lines:
         points = np.concatenate([line for cylinder in lines for line in cylinder])
     for number, cylinder in enumerate(lines):
-        color = cylinder_colors(np.array([number]))[0] / 255.0 * 0.6
+        color = cylinder_colors(tones[[number]])[0] / 255.0 * 0.6
         for line in cylinder:
             axes.plot(*line.T, color=color, linewidth=1.0)
+    for owner, piece in view.fittings:
+        color = cylinder_colors(tones[[owner]])[0] / 255.0 * 0.6
+        for rim in outline(piece)[:2]:
+            axes.plot(*rim.T, color=color, linewidth=0.6)
     if len(points):
         _frame(axes, points)
     count = len(view.shapes)

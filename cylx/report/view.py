@@ -13,6 +13,7 @@ from cylx.errors import UsageError
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder
 from cylx.records import Extraction, PointCloud
+from cylx.report.fittings import labels_with_fittings, pieces_of, runs_of
 from cylx.report.points import original_colors
 from cylx.results.parts import Input
 
@@ -46,6 +47,10 @@ class View:
         Seed for the choice of points.
     blends : tuple of Cylinder
         Scene units; drawn in a muted colour.
+    runs : tuple of int or None
+        Run of each cylinder; None if they were not looked for.
+    fittings : tuple of (int, Cylinder)
+        Pieces of the fittings between cylinders, each with the cylinder that it is shown with.
     """
 
     name: str
@@ -58,6 +63,8 @@ class View:
     noise: float
     seed: int = 0
     blends: tuple[Cylinder, ...] = ()
+    runs: tuple[int, ...] | None = None
+    fittings: tuple[tuple[int, Cylinder], ...] = ()
 
     @classmethod
     def of(cls, found: Extraction | Result, cloud: PointCloud | ArrayLike | None = None) -> View:
@@ -80,17 +87,20 @@ class View:
         if isinstance(found, Extraction):
             if cloud is not None:
                 raise UsageError("cloud", "an extraction has its points already", "leave the cloud out")
+            piping = found.piping
             return cls(
                 Input.of(found).file,
                 tuple(fit.cylinder for fit in found.cylinders),
                 found.cloud.points,
-                found.labels,
+                labels_with_fittings(found),
                 found.residuals,
                 original_colors(found.cloud),
                 float(found.scene.spacing),
                 float(found.scene.noise),
                 found.config.seed,
                 tuple(fit.cylinder for fit in found.blends or ()),
+                None if piping is None else runs_of(piping, len(found.cylinders)),
+                () if piping is None else tuple(pieces_of(piping)),
             )
         if cloud is None:
             cloud = PointCloud(np.empty((0, 3)))
@@ -128,8 +138,11 @@ class View:
         """Return the first cylinders and blends, and all points; points of the other cylinders lose their labels."""
         if len(self.shapes) <= count:
             return replace(self, blends=self.blends[:count])
+        runs = None if self.runs is None else self.runs[:count]
+        fittings = tuple(one for one in self.fittings if one[0] < count)
         labels = np.where(self.labels < count, self.labels, -1).astype(np.int32)
-        return replace(self, shapes=self.shapes[:count], labels=labels, blends=self.blends[:count])
+        shown = self.shapes[:count]
+        return replace(self, shapes=shown, labels=labels, blends=self.blends[:count], runs=runs, fittings=fittings)
 
 
 def _annotations(cloud: PointCloud, count: int) -> tuple[NDArray[np.int32], NDArray[np.float32]]:

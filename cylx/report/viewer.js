@@ -159,6 +159,8 @@ class Viewer {
     this.palette = unpack(view.palette, Uint8Array);
     this.tubes = view.cylinders.map((numbers) => this.tube(numbers));
     this.blends = view.blends.map((numbers) => this.tube(numbers));
+    this.runs = view.runs;
+    this.fittings = view.fittings.map(([cylinder, ...numbers]) => ({ cylinder, tube: this.tube(numbers) }));
     this.shown = { coloring: "cylinder", points: true, others: true, cylinders: true, noises: 4, dot: 1 };
     this.hidden = new Set();
     this.selected = -1;
@@ -196,6 +198,7 @@ class Viewer {
     const { coloring, points, others, noises } = this.shown;
     const colors = new Uint8Array(4 * this.count);
     const scale = this.view.noises / (127 * noises);
+    const place = coloring === "run" ? this.runs : null; // points of one run have one colour
     const table = Array.from({ length: 256 }, (_, i) => diverging((i - 128) * scale));
     const hidden = Uint8Array.from({ length: this.tubes.length }, (_, i) => (this.hidden.has(i) ? 1 : 0));
     let visible = 0;
@@ -206,7 +209,7 @@ class Viewer {
       let [from, at] = [OTHERS, 0];
       if (coloring === "original" && this.original) [from, at] = [this.original, 3 * i];
       else if (label !== this.none && coloring === "residual") from = table[this.residuals[i] + 128];
-      else if (label !== this.none) [from, at] = [this.palette, 3 * label];
+      else if (label !== this.none) [from, at] = [this.palette, 3 * (place ? place[label] : label)];
       for (let k = 0; k < 3; k++) colors[4 * i + k] = from[at + k];
       colors[4 * i + 3] = 255;
     }
@@ -375,10 +378,16 @@ class Viewer {
     gl.bindBuffer(gl.ARRAY_BUFFER, this.tubeBuffer);
     gl.enableVertexAttribArray(names.corner);
     gl.vertexAttribPointer(names.corner, 3, gl.FLOAT, false, 0, 0);
+    const byRun = this.shown.coloring === "run" && this.runs;
+    const colorOf = (number) => {
+      const place = 3 * (byRun ? this.runs[number] : number);
+      return Array.from(this.palette.subarray(place, place + 3), (part) => part / 255);
+    };
     this.tubes.forEach((tube, number) => {
-      const color = Array.from(this.palette.subarray(3 * number, 3 * number + 3), (part) => part / 255);
-      if (!this.hidden.has(number)) this.drawTube(names, tube, color, number === this.selected);
+      if (!this.hidden.has(number)) this.drawTube(names, tube, colorOf(number), number === this.selected);
     });
+    for (const { cylinder, tube } of this.fittings)
+      if (!this.hidden.has(cylinder)) this.drawTube(names, tube, byRun ? colorOf(cylinder) : MUTED, false);
     this.blends.forEach((tube) => this.drawTube(names, tube, MUTED, false));
     gl.disableVertexAttribArray(names.corner);
     gl.depthMask(true);

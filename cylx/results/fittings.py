@@ -11,7 +11,8 @@ from cylx.results.cylinders import Numbered
 from cylx.results.parts import Count, Length, Number, Part, Vector, drop_missing, plain_numbers
 
 if TYPE_CHECKING:
-    from cylx.records.fittings import Adjustment, Fitting, PipeRun
+    from cylx.records.fittings import Fitting
+    from cylx.records.piping import Adjustment, PipeRun
 
 Positive = Annotated[Number, Field(gt=0)]
 Share = Annotated[Number, Field(ge=0, le=1)]

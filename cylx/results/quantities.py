@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 from cylx.harmless import cell
 
 if TYPE_CHECKING:
+    from cylx.results.cylinders import ResultCylinder
     from cylx.results.fittings import AnyFitting
     from cylx.results.result import Result
 
 COLUMNS = ("item", "size", "to_size", "angle_deg", "bend_radius", "count", "length", "assumed")
+ONE_SIZE = 1.03
+"""Without a catalogue, radii up to this factor apart are one size."""
 SAME_BEND = 4.0
 """Bend radii are counted together by the nearest quarter of the diameter."""
 
@@ -64,14 +67,28 @@ def quantities_csv(result: Result) -> str:
 
 
 def _sizes(result: Result) -> dict[int, tuple[float, str]]:
-    """Return diameter and name of the size of each cylinder: that of all pipes of its size in its run."""
-    out: dict[int, tuple[float, str]] = {}
+    """Return diameter and name of the size of each cylinder: nominal, or the mean of all that are nearly equal."""
+    named: dict[int, str] = {}
     for run in result.runs or ():
         for size in run.sizes:
-            name = size.nominal or f"{2 * size.radius:.4g}"
-            out.update(dict.fromkeys(size.cylinders, (2.0 * size.radius, name)))
-    for one in result.cylinders:
-        out.setdefault(one.id, (2.0 * one.radius, f"{2 * one.radius:.4g}"))
+            if size.nominal is not None:
+                named.update(dict.fromkeys(size.cylinders, size.nominal))
+    groups: dict[str | int, list[ResultCylinder]] = {}
+    last = None
+    for one in sorted(result.cylinders, key=lambda one: (one.radius, one.id)):
+        if one.id in named:
+            groups.setdefault(named[one.id], []).append(one)
+            continue
+        if last is None or one.radius > ONE_SIZE * groups[last][0].radius:
+            last = one.id
+        groups.setdefault(last, []).append(one)
+    out: dict[int, tuple[float, str]] = {}
+    for key, members in groups.items():
+        length = sum(one.height for one in members)
+        weights = [one.height / length if length > 0 else 1.0 / len(members) for one in members]
+        diameter = 2.0 * sum(weight * one.radius for weight, one in zip(weights, members, strict=True))
+        name = key if isinstance(key, str) else f"{diameter:.4g}"
+        out.update({one.id: (diameter, name) for one in members})
     return out
 
 

@@ -26,7 +26,7 @@ from cylx.wording import counted
 
 if TYPE_CHECKING:
     from cylx.records import CylinderFit, Extraction, Scene, StageReport, TiledExtraction
-    from cylx.records.fittings import Piping
+    from cylx.records.piping import Piping
 
 
 class SceneScale(Part):

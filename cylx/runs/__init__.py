@@ -10,24 +10,17 @@ from numpy.typing import NDArray
 from cylx.fits.nominal_radius import Catalogue
 from cylx.geometry.arrays import FloatArray
 from cylx.records import CylinderFit
+from cylx.runs.adding import add_caps, add_collars, add_gaps, add_junctions, add_reducers
 from cylx.runs.answer import Traced, answer_of, in_order
 from cylx.runs.crossings import split_crossings
+from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
 from cylx.runs.onward import follow_ends
 from cylx.runs.parts import drop_parts
 from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.roughness import is_rough
-from cylx.runs.tracing import (
-    Trace,
-    add_bends,
-    add_caps,
-    add_collars,
-    add_gaps,
-    add_junctions,
-    add_reducers,
-    trim,
-)
+from cylx.runs.tracing import Trace
 
 __all__ = ["Traced", "trace_runs"]
 
@@ -69,7 +62,7 @@ def trace_runs(
     near = Surroundings(points, labels, spacing, noise)
     pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
     pipes = split_crossings(settled(pipes, near), near)
-    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_bore or is_rough(pipe, near))
+    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_other or is_rough(pipe, near))
     trace = Trace(pipes, near, others=others)
     add_bends(trace, near)
     add_reducers(trace, near)

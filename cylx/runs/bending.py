@@ -111,7 +111,7 @@ class FittedBend:
     covariances: FloatArray
 
 
-def meetings(pipes: list[Pipe], taken: set[tuple[int, End]]) -> Iterator[Meeting]:
+def meetings(pipes: list[Pipe], taken: set[tuple[int, End]], only: frozenset[int] | None = None) -> Iterator[Meeting]:
     """Yield the pairs of free ends whose axes meet ahead of them, at an angle.
 
     Parameters
@@ -119,6 +119,8 @@ def meetings(pipes: list[Pipe], taken: set[tuple[int, End]]) -> Iterator[Meeting
     pipes : list of Pipe
     taken : set of (int, {'start', 'end'})
         Ends that have a fitting already.
+    only : frozenset of int, optional
+        Pipes of which each pair has one at least; by default any.
     """
     keys = [(i, end) for i in range(len(pipes)) for end in ENDS if (i, end) not in taken]
     if len(keys) < 2:
@@ -131,7 +133,10 @@ def meetings(pipes: list[Pipe], taken: set[tuple[int, End]]) -> Iterator[Meeting
         smaller = np.minimum(radii, radii[a])
         near = np.linalg.norm(places - places[a], axis=1) < REACH * smaller
         alike = np.abs(radii - radii[a]) < SAME_RADIUS * smaller + ON_SURFACE * np.hypot(sd, sd[a])
-        for b in np.flatnonzero(near & alike & (owners > i)):
+        wanted = owners > i
+        if only is not None and i not in only:
+            wanted &= np.isin(owners, list(only))
+        for b in np.flatnonzero(near & alike & wanted):
             other = keys[int(b)]
             found = _meeting(pipes[i], end, pipes[other[0]], other[1])
             if found is not None:

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import axis_basis
 from cylx.geometry.lines import common_perpendicular
 from cylx.records import CylinderFit, Elbow, Fitting, Junction, PipeRun, Piping, Reducer
-from cylx.records.fittings import Adjustment
+from cylx.records.piping import Adjustment
 from cylx.runs.answer import turn_ends
 from cylx.runs.bend import Bend
 from cylx.runs.pipes import OTHER, Pipe, tilted
@@ -115,13 +116,14 @@ def _constraints(index: int, fitting: Fitting, pipes: Sequence[Pipe]) -> Iterato
         for other in fitting.joins[1:]:
             pair = main, other
             yield Constraint(index, "meeting", pair, _skew, abs(_skew(_axes(pair, pipes))), 0.0)
-            angle = _turn(_axes(pair, pipes))
+            sign = 1.0 if float(pipes[main].direction @ pipes[other].direction) >= 0 else -1.0
+            angle = _turn(_axes(pair, pipes), sign)
             target = min(ROUND_ANGLES, key=lambda one: abs(one - angle))
             yield Constraint(
                 index,
                 "angle_deg",
                 pair,
-                lambda axes, target=target: _turn(axes) - target,  # type: ignore[misc]  # bound now
+                lambda axes, target=target, sign=sign: _turn(axes, sign) - target,  # type: ignore[misc]  # bound now
                 math.degrees(angle),
                 math.degrees(target),
             )
@@ -144,16 +146,14 @@ def _skew(axes: list[tuple[FloatArray, FloatArray]]) -> float:
     return float((two - one) @ across) / max(float(np.linalg.norm(across)), 1e-12)
 
 
-def _turn(axes: list[tuple[FloatArray, FloatArray]]) -> float:
-    """Return the angle of two axes, at most a right one."""
+def _turn(axes: list[tuple[FloatArray, FloatArray]], sign: float) -> float:
+    """Return the angle of the first axis and of the second times a sign: smooth, also at a right angle."""
     first, second = axes[0][1], axes[1][1]
-    return math.atan2(float(np.linalg.norm(np.cross(first, second))), abs(float(first @ second)))
+    return math.atan2(float(np.linalg.norm(np.cross(first, second))), sign * float(first @ second))
 
 
 def _in_line(part: int, pipe: Pipe) -> Measure:
     """Return a part of what is 0 for axes in line: two of the directions, and two of their distance halfway."""
-    from cylx.geometry.cylinder import axis_basis  # noqa: PLC0415
-
     basis = axis_basis(pipe.direction)
 
     def measure(axes: list[tuple[FloatArray, FloatArray]]) -> float:
@@ -281,6 +281,7 @@ def _touching(fitting: Fitting, pipes: list[Pipe], origin: FloatArray) -> Fittin
     if isinstance(fitting, Junction):
         main, branch = joined[0], joined[1]
         feet = common_perpendicular(main.middle, main.direction, branch.middle, branch.direction)[:2]
-        angle = _turn([(main.middle, main.direction), (branch.middle, branch.direction)])
+        angle = _turn([(main.middle, main.direction), (branch.middle, branch.direction)], 1.0)
+        angle = min(angle, math.pi - angle)
         return replace(fitting, center=feet[0] + origin, angle=angle)
     return fitting

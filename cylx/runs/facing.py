@@ -10,7 +10,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.runs.bend import LEAST_TURN
-from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings
+from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, sectors_of
 
 LONGEST_REDUCER = 8.0
 """Distance of the ends, in the larger radius."""
@@ -244,7 +244,5 @@ def _judged(
 def _sectors(
     points: FloatArray, start: FloatArray, end: FloatArray, heights: FloatArray, low: float, high: float
 ) -> IndexArray:
-    from cylx.runs.pipes import sectors_of  # noqa: PLC0415
-
     axis = (end - start) / np.linalg.norm(end - start)
     return sectors_of(points, start, axis, 12)

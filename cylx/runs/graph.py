@@ -10,7 +10,7 @@ import numpy as np
 from cylx.fits.nominal_radius import Catalogue, choose_entry
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Elbow, Fitting, Inline, Joint, Junction, OpenEnd, PipeRun, PipeSize, Reducer
-from cylx.records.fittings import Openness
+from cylx.records.piping import Openness
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings
 
 LEVEL = math.radians(45.0)

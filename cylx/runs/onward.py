@@ -12,9 +12,10 @@ from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import Bend
 from cylx.runs.bend_fit import Solved, refined
 from cylx.runs.bending import FittedBend, judged
+from cylx.runs.elbows import add_bends, add_fitted
 from cylx.runs.narrowing import narrowed
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
-from cylx.runs.tracing import Trace, add_fitted
+from cylx.runs.tracing import Trace
 
 AHEAD = 14.0
 """How far ahead is looked, in radii."""
@@ -72,6 +73,8 @@ def follow_ends(trace: Trace, near: Surroundings) -> int:
                 trace.pipes.append(pipe)
                 add_fitted(trace, [bend])
                 near.label(near.on(trace.pipes[-1]), pipe.label)
+                # it may end at a pipe that is known: that one need not be followed
+                add_bends(trace, near, frozenset({len(trace.pipes) - 1}))
                 count += 1
     return count
 

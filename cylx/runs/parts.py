@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
-from cylx.records import Flange, Inline, Junction
+from cylx.records import Elbow, Flange, Inline, Junction
 from cylx.runs.pipes import Pipe
 from cylx.runs.tracing import Trace
 from cylx.runs.wider import LONGEST_RIM
 
+WITHIN = 0.5
+"""A piece of an elbow that was found as a cylinder has its axis within so many radii of the centre line."""
 LEAST_LEFT, LEAST_POINTS = 0.7, 8
 """A pipe that was found along a run has a length of so many radii, and so many points, in the end."""
 
@@ -33,6 +35,9 @@ def drop_parts(trace: Trace) -> Trace:
                 inside = abs(along) + 0.4 * pipe.length < 0.5 * float(np.linalg.norm(high - low)) + 0.3 * reach
                 if inside and beside + pipe.radius < 1.15 * reach:
                     parts.add(k)
+    for fitting in trace.fittings:
+        if isinstance(fitting, Elbow) and fitting.bend_radius > 0:
+            parts |= {k for k, pipe in enumerate(trace.pipes) if k not in joined and _is_within(pipe, fitting)}
     parts |= {k for k, pipe in enumerate(trace.pipes) if _is_remnant(pipe, trace)}
     kept = [k for k in range(len(trace.pipes)) if k not in parts]
     number = {old: new for new, old in enumerate(kept)}
@@ -46,6 +51,18 @@ def drop_parts(trace: Trace) -> Trace:
             moved = replace(moved, main=main, branches=branches)
         out.add(moved, points)
     return out
+
+
+def _is_within(pipe: Pipe, elbow: Elbow) -> bool:
+    """Return whether a pipe is a piece of an elbow that was found as a cylinder."""
+    apart = np.array([pipe.start, pipe.middle, pipe.end]) - elbow.center
+    high = apart @ elbow.normal
+    out = np.sqrt(np.maximum(np.einsum("ij,ij->i", apart, apart) - high**2, 0.0))
+    radial = (elbow.start - elbow.center) / elbow.bend_radius
+    turn = np.arctan2(apart @ np.cross(elbow.normal, radial), apart @ radial)
+    on = np.hypot(out - elbow.bend_radius, high) < WITHIN * elbow.radius
+    slack = WITHIN * elbow.radius / elbow.bend_radius
+    return bool(on.all() and (turn > -slack).all() and (turn < elbow.angle + slack).all())
 
 
 def _is_remnant(pipe: Pipe, trace: Trace) -> bool:

@@ -30,6 +30,8 @@ UNSURE = 0.01
 """A radius less certain than this, in itself, may be that of two pipes taken for one."""
 HOLE = 12.0
 """Log-likelihood ratio against a pipe, within it, from which it may be two pipes."""
+ONE_RADIUS, MOST_PIECES = 0.15, 2
+"""What is more pieces of about one radius winds: it is no pipe."""
 PARTS = 4
 DEPTH = 4
 """Times that the rest of a pipe is looked at for more pieces."""
@@ -52,11 +54,14 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
     if near.cells is None:
         return list(pipes)
     out, more = [], []
-    for pipe in pipes:
+    for one in pipes:
+        pipe = one
         rough = is_rough(pipe, near)
-        pieces = [] if rough else _pieces(pipe, near, [one for one in pipes if one is not pipe], DEPTH)
+        pieces = [] if rough else _pieces(pipe, near, [other for other in pipes if other is not pipe], DEPTH)
         if any(is_rough(piece, near) for piece in pieces):
             pieces = []
+        if sum(abs(piece.radius - pipe.radius) < ONE_RADIUS * pipe.radius for piece in pieces) > MOST_PIECES:
+            pieces, pipe = [], replace(pipe, is_other=True)
         first = max(pieces, key=lambda one: one.length) if pieces else pipe
         for piece in pieces:
             if piece is first:

@@ -46,8 +46,8 @@ class Pipe:
         What `Surroundings` calls its points.
     source : int or None
         Index of the cylinder that it was; None for one that was found along a run.
-    is_bore : bool
-        Whether its surface is seen from inside.
+    is_other : bool
+        Whether it is no pipe: its surface is seen from inside, or it winds.
     length : float
         Length of its axis.
     direction : ndarray of shape (3,)
@@ -61,7 +61,7 @@ class Pipe:
     covariance: FloatArray
     label: int
     source: int | None = None
-    is_bore: bool = False
+    is_other: bool = False
     length: float = field(init=False)
     direction: FloatArray = field(init=False)
 

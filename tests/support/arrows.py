@@ -28,7 +28,7 @@ MAY_IMPORT = {
     "scene": {"config", "errors", "fits", "geometry", "records"},
     "game": {"geometry", "records"},
     "baselines": {"config", "errors", "fits", "geometry", "optional", "records"},
-    "results": {"config", "errors", "harmless", "optional", "records", "version", "wording"},
+    "results": {"config", "errors", "geometry", "harmless", "optional", "records", "version", "wording"},
     "io": {"errors", "optional", "palette", "records"},
     "evidence": {"geometry", "records"},
     "records": {"config", "fits", "geometry", "wording"},

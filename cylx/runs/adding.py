@@ -1,0 +1,231 @@
+"""All other fittings: which of the proposed ones are there, the best supported first."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cylx.records import Cap, Cross, Fitting, Flange, Inline, Joint, Junction, Reducer
+from cylx.runs.caps import fit_cap
+from cylx.runs.collars import Collar, collars_of
+from cylx.runs.crossings import equal_crossings
+from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
+from cylx.runs.junctions import Branching, branchings
+from cylx.runs.pipes import ENDS, Surroundings
+from cylx.runs.tracing import BY_AXES, Trace, trust
+
+THROUGH = 0.9
+"""Confidence of a cross of two pipes of one radius that go through each other."""
+CROSSING = 0.5
+"""Branches that face each other meet the main within so many of its radii of each other."""
+
+
+def add_reducers(trace: Trace, near: Surroundings) -> int:
+    """Add the reducers between ends of different radius that face each other; return their number."""
+    pairs = (one for one in facing_ends(trace.pipes, trace.closed) if not one.same_size)
+    tried = (fit_reducer(one, trace.pipes, near) for one in pairs)
+    found = sorted((one for one in tried if one is not None), key=lambda one: (one.facing.gap, -len(one.indices)))
+    count = 0
+    for one in found:
+        if trace.is_free(zip(one.facing.pipes, one.facing.ends, strict=True)):
+            _add_reducer(trace, one)
+            count += 1
+    return count
+
+
+def _add_reducer(trace: Trace, one: FittedCone) -> None:
+    """Add a reducer, and let its pipes end where it begins."""
+    facing = one.facing
+    for index, end, place in zip(facing.pipes, facing.ends, (one.start, one.end), strict=True):
+        trace.pipes[index] = trace.pipes[index].with_end(end, place)
+    first, second = (trace.pipes[i] for i in facing.pipes)
+    fitting = Reducer(
+        joins=facing.pipes,
+        ends=facing.ends,
+        confidence=trust(len(one.indices), one.lengthwise) if len(one.indices) else BY_AXES,
+        inliers=len(one.indices),
+        rms=one.rms,
+        coverage=one.coverage,
+        std=one.std,
+        start=one.start,
+        end=one.end,
+        start_radius=first.radius,
+        end_radius=second.radius,
+        offset=facing.offset,
+        concentric=facing.offset < max(0.4 * abs(first.radius - second.radius), 2.0 * one.std.get("offset", 0.0)),
+    )
+    trace.add(fitting, one.indices)
+
+
+def add_junctions(trace: Trace, near: Surroundings) -> int:
+    """Add the tees and crosses; return their number."""
+    found = list(branchings(trace.pipes, trace.closed, trace.aside, near))
+    used: set[int] = set()
+    count = 0
+    for k, one in enumerate(found):
+        if k in used:
+            continue
+        group = [one]
+        for m in range(k + 1, len(found)):
+            other = found[m]
+            apart = float(np.linalg.norm(other.center - one.center))
+            against = trace.pipes[one.branch].outward(one.end) @ trace.pipes[other.branch].outward(other.end)
+            if (
+                m not in used
+                and other.main == one.main
+                and apart < CROSSING * trace.pipes[one.main].radius
+                and against < -0.9
+            ):
+                group.append(other)
+                used.add(m)
+                break
+        _add_junction(trace, group, near)
+        count += 1
+    known = {frozenset(one.joins) for one in trace.fittings if isinstance(one, Junction)}
+    for main, branch, center, sine in equal_crossings(trace.pipes, trace.aside):
+        if frozenset((main, branch)) not in known:
+            cross = Cross(
+                joins=(main, branch),
+                ends=("side", "side"),
+                confidence=THROUGH,
+                center=center,
+                main=(main,),
+                branches=(branch,),
+                angle=math.asin(min(sine, 1.0)),
+            )
+            trace.add(cross, np.empty(0, np.int64))
+            count += 1
+    return count
+
+
+def _add_junction(trace: Trace, group: list[Branching], near: Surroundings) -> None:
+    """Add a tee, or a cross of two branchings."""
+    first = group[0]
+    branches = tuple(one.branch for one in group)
+    contact = 1.0 / (1.0 + max(0.0, first.gap / trace.pipes[first.branch].radius - 1.0))
+    kind = Junction if len(group) == 1 else Cross
+    fitting = kind(
+        joins=(first.main, *branches),
+        ends=("side", *(one.end for one in group)),
+        confidence=0.6 + 0.35 * contact,
+        center=first.center,
+        main=(first.main,),
+        branches=branches,
+        angle=first.angle,
+        std=first.std,
+    )
+    trace.add(fitting, np.empty(0, np.int64))
+
+
+def add_collars(trace: Trace, near: Surroundings) -> int:
+    """Add the flanges on pipes, and what is between them; return their number."""
+    count = 0
+    for index in range(len(trace.pipes)):
+        if index in trace.aside:
+            continue
+        shut = (index, "start") in trace.taken, (index, "end") in trace.taken
+        for collar in collars_of(index, trace.pipes, near, shut):
+            _add_collar(trace, index, collar)
+            count += 1
+    return count
+
+
+def _add_collar(trace: Trace, index: int, collar: Collar) -> None:
+    pipe = trace.pipes[index]
+    if collar.kind == "flange":
+        trace.add(
+            Flange(
+                joins=(index,),
+                ends=(collar.where,),
+                confidence=collar.confidence,
+                inliers=len(collar.indices),
+                rms=collar.rms,
+                coverage=collar.coverage,
+                std=collar.std,
+                center=collar.center,
+                axis=pipe.direction,
+                radius=collar.radius,
+                thickness=collar.thickness,
+                pair=collar.pair,
+            ),
+            collar.indices,
+        )
+        return
+    half = 0.5 * collar.thickness * pipe.direction
+    trace.add(
+        Inline(
+            joins=(index,),
+            ends=("side",),
+            confidence=collar.confidence,
+            inliers=len(collar.indices),
+            coverage=collar.coverage,
+            start=collar.center - half,
+            end=collar.center + half,
+        ),
+        collar.indices,
+    )
+
+
+def add_gaps(trace: Trace, near: Surroundings) -> int:
+    """Add what bridges gaps between ends of one size; return their number."""
+    pairs = sorted(
+        (one for one in facing_ends(trace.pipes, trace.closed) if one.same_size), key=lambda one: abs(one.gap)
+    )
+    count = 0
+    for one in pairs:
+        if trace.is_free(zip(one.pipes, one.ends, strict=True)):
+            _add_gap(trace, one, near)
+            count += 1
+    return count
+
+
+def _add_gap(trace: Trace, one: Facing, near: Surroundings) -> None:
+    first, second = (trace.pipes[i] for i in one.pipes)
+    start, end = first.at(one.ends[0]), second.at(one.ends[1])
+    radius, axis = first.radius, first.outward(one.ends[0])
+    inner = near.about(start, axis, 0.1 * one.gap, 0.9 * one.gap, 3.0 * radius, 1.2 * radius)
+    inner = inner[near.free(inner)]
+    tube = near.about(start, axis, 0.0, max(one.gap, 0.0), 1.1 * radius, 0.9 * radius)
+    if len(inner) > 0.5 * near.density(first) * 2 * np.pi * radius * max(one.gap, 0.0) and len(inner) > 20:
+        fitting: Fitting = Inline(
+            joins=one.pipes, ends=one.ends, confidence=0.6, inliers=len(inner), start=start, end=end
+        )
+        trace.add(fitting, inner)
+        return
+    fitting = Joint(
+        joins=one.pipes,
+        ends=one.ends,
+        confidence=0.5 + 0.4 / (1.0 + max(one.gap, 0.0) / (4.0 * radius)),
+        start=start,
+        end=end,
+        length=float(np.linalg.norm(end - start)),
+        assumed=len(tube) < 10 and one.gap > radius,
+    )
+    trace.add(fitting, np.empty(0, np.int64))
+
+
+def add_caps(trace: Trace, near: Surroundings) -> int:
+    """Add the caps of ends that nothing joins; return their number."""
+    count = 0
+    for index, pipe in enumerate(trace.pipes):
+        for end in ENDS:
+            if (index, end) in trace.closed:
+                continue
+            cap = fit_cap(pipe, end, near)
+            if cap is not None:
+                fitting = Cap(
+                    joins=(index,),
+                    ends=(end,),
+                    confidence=trust(len(cap.indices), cap.coverage),
+                    inliers=len(cap.indices),
+                    rms=cap.rms,
+                    coverage=cap.coverage,
+                    std={"center": cap.std},
+                    center=cap.center,
+                    axis=pipe.outward(end),
+                    radius=pipe.radius,
+                )
+                trace.add(fitting, cap.indices)
+                count += 1
+    return count
