@@ -31,6 +31,10 @@ STEEPEST = radians(150.0)
 FLAT = 0.1
 """Thickness of a cap that does not bulge, in its radius."""
 
+BEYOND = 0.5
+"""A junction goes so far beyond the line where its surfaces meet, in the radius of its branch: a scan does not show how
+far it goes, and solids that only just touch are hard to join."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Claim:
@@ -123,19 +127,17 @@ def _overlap(
 
 
 def _junction(fitting: ResultTee | ResultCross, cylinders: Mapping[int, ResultCylinder]) -> list[Claim]:
-    """Return the smallest junction that holds all of the line where the surfaces of main and branch meet."""
+    """Return a junction that reaches a little beyond the line where the surfaces of main and branch meet."""
     center, mains = np.array(fitting.center), set(fitting.main)
     if not set(fitting.branches) | mains <= set(fitting.joins) or not mains or not fitting.branches:
         return []
     turn = radians(fitting.angle_deg)
     main = max(cylinders[number].radius for number in mains)
     branch = max(cylinders[number].radius for number in fitting.branches)
-    along_main = (branch + main * cos(turn)) / sin(turn)
-    along_branch = (main + branch * cos(turn)) / sin(turn)
+    along_main = (branch + main * cos(turn)) / sin(turn) + BEYOND * branch
+    along_branch = (main + branch * cos(turn)) / sin(turn) + BEYOND * branch
     return [
-        Claim(
-            fitting.id, number, end, center, along_main if number in mains else along_branch, may_vanish=False
-        )
+        Claim(fitting.id, number, end, center, along_main if number in mains else along_branch, may_vanish=False)
         for number, end in zip(fitting.joins, fitting.ends, strict=True)
     ]
 
@@ -152,9 +154,7 @@ def _flange(flange: ResultFlange, cylinders: Mapping[int, ResultCylinder]) -> li
         (number,), (end,) = flange.joins, flange.ends
         outward = _outward(cylinders[number], end)
         return [Claim(flange.id, number, end, center + half * outward, flange.thickness)]
-    return [
-        Claim(flange.id, number, end, center, half) for number, end in zip(flange.joins, flange.ends, strict=True)
-    ]
+    return [Claim(flange.id, number, end, center, half) for number, end in zip(flange.joins, flange.ends, strict=True)]
 
 
 def _cap(cap: ResultCap, cylinders: Mapping[int, ResultCylinder]) -> list[Claim]:

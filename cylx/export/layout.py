@@ -142,8 +142,7 @@ def _lay(line: _Line, out: Layout) -> None:
     found, radius = line.found, line.found.radius
     held = [line.ends.get(end) for end in ("start", "end")]
     first, last = (
-        np.array(own) if one is None else one.anchor
-        for one, own in zip(held, (found.start, found.end), strict=True)
+        np.array(own) if one is None else one.anchor for one, own in zip(held, (found.start, found.end), strict=True)
     )
     u = unit(last - first, np.array(found.axis_direction))
     out.directions[found.id] = u
@@ -156,8 +155,9 @@ def _lay(line: _Line, out: Layout) -> None:
         low, high = min(low, spans[0].low), max(high, spans[-1].high)
     cursor: Key | None = None
     if held[0] is not None:
-        cursor = (held[0].fitting, found.id, "start")
-        out.ports[cursor] = Port(first + low * u, u, radius)
+        begin: Key = (held[0].fitting, found.id, "start")
+        out.ports[begin] = Port(first + low * u, u, radius)
+        cursor = begin
     at = low
     for span in spans:
         before: Key = (span.claim.fitting, found.id, "low")
@@ -168,8 +168,9 @@ def _lay(line: _Line, out: Layout) -> None:
         cursor, at = after, span.high
     final: Key | None = None
     if held[1] is not None:
-        final = (held[1].fitting, found.id, "end")
-        out.ports[final] = Port(first + high * u, -u, radius)
+        finish: Key = (held[1].fitting, found.id, "end")
+        out.ports[finish] = Port(first + high * u, -u, radius)
+        final = finish
     _join(out, line, (first + at * u, first + high * u), (cursor, final), high - at)
 
 
@@ -186,7 +187,7 @@ def _join(
 def _spans(
     line: _Line, first: FloatArray, u: FloatArray, low: tuple[float, bool], high: tuple[float, bool]
 ) -> list[_Span]:
-    """Return what sits on a line in its order, cut where it would overlap; `low` and `high` say whether they are held."""
+    """Return what sits on a line in its order, cut where it would overlap, and at ends that are held."""
     spans = []
     for one in line.items:
         middle = float((one.anchor - first) @ u)

@@ -34,9 +34,9 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     """Write the meshes of the cylinders, and of the fittings if there are any.
 
     PLY and OBJ colour the corners, GLB gives each cylinder a material. PLY has the cylinder of a corner in
-    `cylinder_id`, and with fittings also `fitting_id`; OBJ and GLB name each cylinder and fitting. GLB is in metres, and rotated so that the z axis of the scan is up.
-    PLY and STL have coordinates in single precision: far from the origin, integers are subtracted from them and written
-    to the header.
+    `cylinder_id`, and with fittings also `fitting_id`; OBJ and GLB name each cylinder and fitting. GLB is in metres,
+    and rotated so that the z axis of the scan is up. PLY and STL have coordinates in single precision: far from the
+    origin, integers are subtracted from them and written to the header.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The parts of piping to write: straights and fittings with their solids, their ports, and what these are joined with."""
+"""The parts of piping to write: straights and fittings with their solids and ports, and what these are joined with."""
 
 from __future__ import annotations
 
@@ -82,6 +82,11 @@ class Piping:
     systems: tuple[tuple[int, ...], ...]
     names: tuple[str, ...]
     bores: dict[int, float]
+
+    @property
+    def fittings(self) -> int:
+        """Number of fittings."""
+        return sum(part.fitting is not None for part in self.parts)
 
 
 def piping_of(
@@ -203,9 +208,7 @@ def _junction(
     return tuple(solids), ((mains[0].place, center, mains[-1].place), *((center, port.place) for port in branches))
 
 
-def ports_of(
-    fitting: ResultTee | ResultCross, keys: Sequence[Key], layout: Layout
-) -> tuple[list[Port], list[Port]]:
+def ports_of(fitting: ResultTee | ResultCross, keys: Sequence[Key], layout: Layout) -> tuple[list[Port], list[Port]]:
     """Return the ports of the main of a junction, and those of its branches."""
     mains = [layout.ports[key] for key in keys if key[1] in fitting.main]
     return mains, [layout.ports[key] for key in keys if key[1] not in fitting.main]
