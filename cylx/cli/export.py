@@ -55,9 +55,9 @@ def export(
     """Write the cylinders of RESULT for other programs.
 
     The suffix of each OUT selects the format: .ply, .obj, .glb and .stl are meshes, .csv is a table, .step and .stp are
-    exact solids, .ifc has pipe segments, .dxf centre lines, and .pcf piping components. If RESULT has fittings, as after
-    'cylx runs', they are written too, and cylinders end where a fitting begins; the table stays as it is. All but .csv
-    and .pcf need an extra, such as 'cylx[mesh]'.
+    exact solids, .ifc has pipe segments, .dxf centre lines, and .pcf piping components. If RESULT has fittings, as
+    those of 'cylx runs', they are written too, and cylinders end where a fitting begins; the table stays as it is. All
+    but .csv and .pcf need an extra, such as 'cylx[mesh]'.
     """
     from cylx.export import format_of, render
     from cylx.io import check_writable

@@ -92,9 +92,10 @@ def _product(model: Model, part: Part, axes: object) -> Any:  # noqa: ANN401  ha
     curves = [_curve(model, part, path, origin) for path in _paths(part)]
     shapes = [model.make("IfcShapeRepresentation", axes, "Axis", "Curve3D", curves)] if curves else []
     if body is not None:
-        kind, solid = body
-        model.paint(solid, part.name, part.color)
-        shapes.append(model.make("IfcShapeRepresentation", model.body, "Body", kind, [solid]))
+        kind, solids = body
+        for solid in solids:
+            model.paint(solid, part.name, part.color)
+        shapes.append(model.make("IfcShapeRepresentation", model.body, "Body", kind, solids))
     attributes = {
         "ObjectPlacement": _placement(model, origin),
         "Representation": model.make("IfcProductDefinitionShape", None, None, shapes) if shapes else None,
@@ -155,29 +156,51 @@ def _arc(model: Model, bend: Bend, origin: FloatArray) -> Any:  # noqa: ANN401  
     return model.make("IfcTrimmedCurve", circle, *bounds, True, "PARAMETER")
 
 
-def _body(model: Model, part: Part, origin: FloatArray) -> tuple[str, Any] | None:
-    """Make the body of a part, with the type of its representation; None if it has none."""
+def _body(model: Model, part: Part, origin: FloatArray) -> tuple[str, list[Any]] | None:
+    """Make the body of a part as one solid or several, with the type of its representation; None if it has none."""
+    if len(part.solids) == 1 and isinstance(part.solids[0], Mitre):
+        return "Clipping", _mitre(model, part.solids[0], origin)
     made = [_solid(model, solid, origin) for solid in part.solids]
     if len(made) > 1:
         whole = made[0][1]
         for _, other in made[1:]:
             whole = model.make("IfcBooleanResult", "UNION", whole, other)
-        return "CSG", whole
-    return made[0] if made else None
+        return "CSG", [whole]
+    return (made[0][0], [made[0][1]]) if made else None
 
 
 def _solid(model: Model, solid: Solid, origin: FloatArray) -> tuple[str, Any]:
     """Make a solid, with the type of its representation."""
     if isinstance(solid, Cylinder):
-        place = _axes(model, solid.start - origin, solid.direction, axis_basis(solid.direction)[0])
-        circle, along = _circle(model, solid.radius), model.direction((0.0, 0.0, 1.0))
-        return "SweptSolid", model.make("IfcExtrudedAreaSolid", circle, place, along, solid.height)
+        return "SweptSolid", _rod(model, solid.start - origin, solid.direction, solid.radius, solid.height)
     if isinstance(solid, Bend):
         return "AdvancedSweptSolid", model.make("IfcSweptDiskSolid", _arc(model, solid, origin), solid.radius)
-    if isinstance(solid, Mitre):
-        places = [model.point(place - origin) for place in (solid.start, solid.corner, solid.end)]
-        return "AdvancedSweptSolid", model.make("IfcSweptDiskSolid", model.make("IfcPolyline", places), solid.radius)
-    return _cone(model, solid, origin)
+    if isinstance(solid, Cone):
+        return _cone(model, solid, origin)
+    raise TypeError("a mitre is more than one solid")
+
+
+def _rod(model: Model, start: FloatArray, along: FloatArray, radius: float, length: float) -> Any:  # noqa: ANN401
+    """Make a rod."""
+    place = _axes(model, start, along, axis_basis(along)[0])
+    up = model.direction((0.0, 0.0, 1.0))
+    return model.make("IfcExtrudedAreaSolid", _circle(model, radius), place, up, length)
+
+
+def _mitre(model: Model, mitre: Mitre, origin: FloatArray) -> list[Any]:
+    """Make two rods, each longer than it is and clipped by the plane between them."""
+    out = []
+    for begin, normal in ((mitre.start, mitre.cut), (mitre.end, -mitre.cut)):
+        away = mitre.corner - begin
+        length = float(np.linalg.norm(away))
+        along = away / length
+        beyond = mitre.radius * float(np.linalg.norm(along - (along @ normal) * normal)) / float(along @ normal)
+        rod = _rod(model, begin - origin, along, mitre.radius, length + 1.1 * beyond)
+        plane = model.make("IfcPlane", _axes(model, mitre.corner - origin, normal, axis_basis(normal)[0]))
+        # it keeps what is behind the plane
+        half = model.make("IfcHalfSpaceSolid", plane, False)
+        out.append(model.make("IfcBooleanClippingResult", "DIFFERENCE", rod, half))
+    return out
 
 
 def _circle(model: Model, radius: float, at: tuple[float, float] = (0.0, 0.0)) -> Any:  # noqa: ANN401
