@@ -95,7 +95,7 @@ def joined(tmp_path, result):
     [
         ([], "6 cylinders and 2 fittings", ["cap 0", "cap 1"]),
         (["--min-confidence", "0.6"], "6 cylinders and 1 fitting", ["cap 0"]),
-        (["--min-confidence", "0.95"], "5 cylinders", []),
+        (["--min-confidence", "0.95"], "6 cylinders", []),
     ],
 )
 def test_fittings_are_written_too(run_cylx, tmp_path, joined, options, said, caps):
