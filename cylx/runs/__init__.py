@@ -68,7 +68,7 @@ def trace_runs(
     add_reducers(trace, near)
     for _ in range(ROUNDS):
         # straights that were found too long have bent with their fittings; those found along the runs are new
-        trace = Trace(trim(trace, near), near, others=others)
+        trace = Trace(trim(trace, near), near, others=others, followed=trace.followed)
         add_bends(trace, near)
         add_reducers(trace, near)
         add_junctions(trace, near)

@@ -26,7 +26,7 @@ OVERSHOOT = 1.5
 """Straights may have been found so many radii too long: into the bend."""
 LOW_TURN = 0.4
 """And over this, in radii, times the tangent of half the angle: a pipe hardly leaves a bend of a small angle."""
-MOST_POINTS = 1500
+MOST_POINTS = 900
 TRIED = 28
 """Bend radii that are tried before the fit."""
 LOOSE = 0.02

@@ -24,8 +24,8 @@ BESIDE = 0.25
 """Axes further apart, in radii, are not one line."""
 STEEPEST = 1.3
 """Radii change by less than this for each length of a reducer; the end of an insulation is a step."""
-STEPS = 22
-MOST_POINTS = 3000
+STEPS = 16
+MOST_POINTS = 1000
 LEAST_INLIERS = 10
 FOREIGN = 0.4
 """More points of other pipes where a reducer is, for each point of it, say that there is another pipe between."""

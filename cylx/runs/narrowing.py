@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,11 +26,23 @@ AHEAD = 12.0
 STEP = 0.25
 SHELL = 0.3
 MOST_POINTS = 500
-LEAST_AHEAD = 20
+LEAST_AHEAD, REACH = 12, 4.0
+"""Free points so many radii ahead of an end, without which no pipe goes on there."""
 LEAST_SCORE, LEAST_BEHIND = 20.0, 10
 """Gain over the pipe alone in log-likelihood, and points of the pipe behind the reducer."""
 LEAST_LENGTH = 0.6
 """Of the pipe behind the reducer, in its radii."""
+
+
+class _Tried(NamedTuple):
+    """A reducer that was tried: its score, the ratio of the radii, and the pipe behind it."""
+
+    score: float
+    times: float
+    begin: float
+    end: float
+    radius: float
+    shift: tuple[float, float]
 
 
 def narrowed(pipe: Pipe, end: End, near: Surroundings) -> Pipe | None:
@@ -47,7 +61,8 @@ def narrowed(pipe: Pipe, end: End, near: Surroundings) -> Pipe | None:
     away = near.points[indices] - place
     first, second = axis_basis(axis)
     x, a, b = away @ axis, away @ first, away @ second
-    if (x > -0.2 * radius).sum() < LEAST_AHEAD:
+    ahead = (x > 0.1 * radius) & (x < REACH * radius) & (np.hypot(a, b) < 2.3 * radius)
+    if ahead.sum() < LEAST_AHEAD:
         return None
     some = slice(None, None, max(1, len(x) // MOST_POINTS))
     found = _best(x[some], a[some], b[some], pipe, back, len(x) / max(len(x[some]), 1))
@@ -84,28 +99,35 @@ def _best(
 
     plain = np.cumsum(np.bincount(rows, weights=gains(np.hypot(a, b) - radius), minlength=count))
     alone = float(plain.max(initial=0.0))
-    best: tuple[float, float, float, float, tuple[float, float]] | None = None
-    for times in RATIOS:
-        other = times * radius
-        offset = abs(other - radius)
-        angles = np.arange(SIDES) * (2.0 * math.pi / SIDES)
-        shifts = [(0.0, 0.0), *((offset * math.cos(t), offset * math.sin(t)) for t in angles)]
-        for long in LENGTHS:
-            length = long * max(radius, other)
-            for before in BEFORE:
-                if before * radius < back:
-                    continue
-                share = np.clip((x - before * radius) / length, 0.0, 1.0)
-                radii = radius + share * (other - radius)
-                for shift in shifts:
-                    errors = np.hypot(a - share * shift[0], b - share * shift[1]) - radii
-                    total = np.cumsum(np.bincount(rows, weights=gains(errors), minlength=count))
-                    last = int(total.argmax())
-                    begin, end = before * radius + length, back + (last + 1) * step
-                    if end - begin < LEAST_LENGTH * other:
+
+    def tried(ratios: Sequence[float], lengths: Sequence[float], befores: Sequence[float], sides: int) -> list[_Tried]:
+        out = []
+        for times in ratios:
+            other = times * radius
+            offset = abs(other - radius)
+            angles = np.arange(sides) * (2.0 * math.pi / sides)
+            shifts = [(0.0, 0.0), *((offset * math.cos(t), offset * math.sin(t)) for t in angles)]
+            for long in lengths:
+                length = long * max(radius, other)
+                for before in befores:
+                    if before * radius < back:
                         continue
-                    if best is None or total[last] > best[0]:
-                        best = (float(total[last]), begin, end, other, shift)
-    if best is None or (best[0] - alone) * weight < LEAST_SCORE:
+                    share = np.clip((x - before * radius) / length, 0.0, 1.0)
+                    radii = radius + share * (other - radius)
+                    for shift in shifts:
+                        errors = np.hypot(a - share * shift[0], b - share * shift[1]) - radii
+                        total = np.cumsum(np.bincount(rows, weights=gains(errors), minlength=count))
+                        last = int(total.argmax())
+                        begin, end = before * radius + length, back + (last + 1) * step
+                        if end - begin >= LEAST_LENGTH * other:
+                            out.append(_Tried(float(total[last]), times, begin, end, other, shift))
+        return out
+
+    first = max(tried(RATIOS, LENGTHS[1::2], BEFORE[::2], 4), default=None)
+    if first is None or (first.score - alone) * weight < 0.3 * LEAST_SCORE:
         return None
-    return best[1:]
+    place = RATIOS.index(first.times)
+    best = max([first, *tried(RATIOS[max(place - 1, 0) : place + 2], LENGTHS, BEFORE, SIDES)])
+    if (best.score - alone) * weight < LEAST_SCORE:
+        return None
+    return best.begin, best.end, best.radius, best.shift

@@ -29,7 +29,7 @@ STEP = 0.25
 """Pieces of the centre line, in radii."""
 SHELL = 0.3
 """Points within so many radii of the surface, but not on it, speak against it."""
-MOST_POINTS, MOST_IN_FIT = 600, 1500
+MOST_POINTS, MOST_IN_FIT = 500, 800
 FIRST, SECOND = 8, 3
 """How many bends are tried with several angles, and how many are fitted."""
 LEAST_AHEAD = 12

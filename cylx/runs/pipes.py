@@ -52,6 +52,8 @@ class Pipe:
         Length of its axis.
     direction : ndarray of shape (3,)
         Unit direction from start to end.
+    basis : pair of ndarray of shape (3,)
+        `axis_basis` of the direction.
     """
 
     start: FloatArray
@@ -64,12 +66,15 @@ class Pipe:
     is_other: bool = False
     length: float = field(init=False)
     direction: FloatArray = field(init=False)
+    basis: tuple[FloatArray, FloatArray] = field(init=False)
 
     def __post_init__(self) -> None:
         along = self.end - self.start
         length = math.sqrt(float(along @ along))
         object.__setattr__(self, "length", length)
-        object.__setattr__(self, "direction", along / max(length, 1e-300))
+        direction = along / max(length, 1e-300)
+        object.__setattr__(self, "direction", direction)
+        object.__setattr__(self, "basis", axis_basis(direction))
 
     @classmethod
     def of(cls, index: int, fit: CylinderFit, origin: FloatArray, noise: float) -> Pipe:
@@ -260,7 +265,7 @@ def sectors_of(points: FloatArray, center: FloatArray, direction: FloatArray, se
 
 def tilted(pipe: Pipe, change: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return middle and unit direction of a pipe's axis after two offsets and two tilts."""
-    first, second = axis_basis(pipe.direction)
+    first, second = pipe.basis
     direction = pipe.direction + change[2] * first + change[3] * second
     middle = pipe.middle + change[0] * first + change[1] * second
     return middle, direction / math.sqrt(float(direction @ direction))
@@ -269,7 +274,7 @@ def tilted(pipe: Pipe, change: FloatArray) -> tuple[FloatArray, FloatArray]:
 def axis_change(pipe: Pipe, other: Pipe, change: FloatArray) -> FloatArray:
     """Return the offsets and tilts that bring a pipe to where another, of about the same axis, is after its own."""
     middle, direction = tilted(other, change)
-    first, second = axis_basis(pipe.direction)
+    first, second = pipe.basis
     along = float((pipe.middle - middle) @ direction)
     away = middle + along * direction - pipe.middle
     slope = direction / float(direction @ pipe.direction)
