@@ -28,6 +28,8 @@ from cylx.results.fittings import (
 
 STEEPEST = radians(150.0)
 """Bends by more than this have no corner that is of use."""
+FLATTEST = radians(10.0)
+"""Branches at less than this angle are drawn as at this one."""
 FLAT = 0.1
 """Thickness of a cap that does not bulge, in its radius."""
 
@@ -131,7 +133,7 @@ def _junction(fitting: ResultTee | ResultCross, cylinders: Mapping[int, ResultCy
     center, mains = np.array(fitting.center), set(fitting.main)
     if not set(fitting.branches) | mains <= set(fitting.joins) or not mains or not fitting.branches:
         return []
-    turn = radians(fitting.angle_deg)
+    turn = max(radians(fitting.angle_deg), FLATTEST)
     main = max(cylinders[number].radius for number in mains)
     branch = max(cylinders[number].radius for number in fitting.branches)
     along_main = (branch + main * cos(turn)) / sin(turn) + BEYOND * branch

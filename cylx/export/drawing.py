@@ -156,7 +156,7 @@ def draw(
     Raises
     ------
     InputError
-        If the axis of a cylinder has no direction.
+        If the axis of a cylinder has no direction, or fittings are where no cylinder can be.
     """
     pieces = []
     for cylinder, color in zip(cylinders, colors.tolist(), strict=True):
@@ -170,4 +170,11 @@ def draw(
         if shape.height > 0.0:
             pieces.append(Piece(cylinder.id, shape, (color[0], color[1], color[2]), cylinder))
     drawing = Drawing(tuple(cylinders), tuple(pieces), unit)
-    return replace(drawing, piping=drawing.joined(fittings, runs)) if fittings else drawing
+    if not fittings:
+        return drawing
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return replace(drawing, piping=drawing.joined(fittings, runs))
+    except (ValueError, ArithmeticError):
+        fault = "they are where no pipes can be, or of no size"
+        raise InputError(f"{place}: fittings", fault, "give a result as cylx writes it") from None

@@ -120,7 +120,8 @@ def lay_out(cylinders: Sequence[ResultCylinder], fittings: Sequence[AnyFitting])
     lines = {one.id: _Line(one) for one in cylinders}
     out = Layout()
     for fitting in sorted(fittings, key=_is_disc):
-        if not set(fitting.joins) <= lines.keys() or len(set(fitting.joins)) != len(fitting.ends):
+        members = set(fitting.joins)
+        if not (members <= lines.keys() and len(members) == len(fitting.joins) == len(fitting.ends)):
             continue
         claims = claims_of(fitting, {number: lines[number].found for number in fitting.joins})
         if _is_disc(fitting) and claims[0].where in lines[claims[0].cylinder].ends:

@@ -205,8 +205,11 @@ class _Writer:
 
 
 def _angle(first: FloatArray, second: FloatArray) -> float:
-    """Return the angle between two vectors, radians."""
-    cosine = float(first @ second) / float(np.linalg.norm(first) * np.linalg.norm(second))
+    """Return the angle between two vectors, radians; a right angle if one has no length."""
+    lengths = float(np.linalg.norm(first) * np.linalg.norm(second))
+    if lengths == 0.0:
+        return 0.5 * np.pi
+    cosine = float(first @ second) / lengths
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 

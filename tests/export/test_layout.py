@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from cylx.errors import InputError
+from cylx.export import draw
 from cylx.export.layout import lay_out
 from cylx.export.parts import piping_of
 from tests.support.piping import FITTINGS, LINKS, VOLUMES, R, piping
@@ -99,3 +101,43 @@ def test_a_result_without_fittings_keeps_its_cylinders():
     assert [one.cylinder for one in layout.straights] == list(R)
     for straight, found in zip(layout.straights, cylinders, strict=True):
         np.testing.assert_allclose([straight.start, straight.end], [found.start, found.end], atol=1e-12)
+
+
+def changed(number, **values):
+    """Give the content with one fitting changed."""
+    cylinders, fittings, runs = piping()
+    new = type(fittings[number]).model_validate({**fittings[number].model_dump(), **values})
+    return cylinders, [new if one.id == number else one for one in fittings], runs
+
+
+@pytest.mark.parametrize(
+    ("number", "values", "kept"),
+    [
+        (4, {"normal": [0.0, 0.0, 0.0]}, True),
+        (4, {"start": [6.0, 0.2, 0.0]}, True),  # the middle of the bend
+        (4, {"bend_radius": 0.01}, True),  # the tube would go through itself
+        (4, {"ends": ["end", "side"]}, False),
+        (4, {"joins": [2, 2], "ends": ["start", "end"]}, False),
+        (4, {"joins": [2]}, False),
+        (5, {"angle_deg": 1e-300}, True),
+        (5, {"main": []}, False),
+        (5, {"branches": [9]}, False),
+        (0, {"ends": ["side"]}, False),
+        (10, {"joins": [14]}, False),
+    ],
+)
+def test_fittings_that_are_not_quite_possible_are_drawn_or_left_out(number, values, kept):
+    cylinders, fittings, runs = changed(number, **values)
+    content = piping_of(cylinders, [(0, 0, 0)] * len(cylinders), fittings, runs)
+    assert any(part.fitting is not None and part.fitting.id == number for part in content.parts) == kept
+    assert {part.cylinder.id for part in content.parts if part.cylinder is not None} == set(R)
+    for one, other in gaps(content):
+        np.testing.assert_allclose(one.place, other.place, atol=1e-9)
+    for part in content.parts:
+        assert all(np.isfinite(port.place).all() for port in part.ports)
+
+
+def test_fittings_where_no_pipe_can_be_are_refused():
+    cylinders, fittings, runs = changed(4, center=[1e300, 0.0, 0.0])
+    with pytest.raises(InputError, match=r"plant\.json: fittings: they are where no pipes can be, or of no size; give"):
+        draw(cylinders, np.zeros((14, 3), np.uint8), place="plant.json", fittings=fittings, runs=runs)
