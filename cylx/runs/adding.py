@@ -103,6 +103,9 @@ def _add_junction(trace: Trace, group: list[Branching], near: Surroundings) -> N
     """Add a tee, or a cross of two branchings."""
     first = group[0]
     branches = tuple(one.branch for one in group)
+    for one in group:
+        if one.gap < 0:
+            trace.pipes[one.branch] = trace.pipes[one.branch].with_end(one.end, one.surface)
     contact = 1.0 / (1.0 + max(0.0, first.gap / trace.pipes[first.branch].radius - 1.0))
     kind = Junction if len(group) == 1 else Cross
     fitting = kind(

@@ -20,8 +20,8 @@ BESIDE = 0.3
 """The axis of a branch passes that of its main within so many radii of it."""
 BEFORE = 2.5
 """The end of a branch may have been found so many of its radii before the surface."""
-AFTER = 2.3
-"""Or so many radii of the main behind the surface."""
+AFTER = 1.1
+"""Or behind the axis of the main, by so many times where it leaves the main at the other side."""
 SEEN = 4
 """Points on the branch just before the surface that show that it gets there."""
 
@@ -43,6 +43,8 @@ class Branching:
         Between the axes, radians.
     gap : float
         From the end to the surface of the main, along the branch.
+    surface : ndarray of shape (3,)
+        On the axis of the branch, at the surface of the main.
     """
 
     main: int
@@ -52,6 +54,7 @@ class Branching:
     root: FloatArray
     angle: float
     gap: float
+    surface: FloatArray
     std: dict[str, float]
 
 
@@ -89,17 +92,18 @@ def _branching(pipes: list[Pipe], i: int, end: End, j: int) -> Branching | None:
         return None
     if abs(float((center - main.middle) @ main.direction)) > 0.5 * main.length - 0.3 * branch.radius:
         return None
-    gap = float((root - branch.at(end)) @ outward) - main.radius / math.sin(angle)
-    if gap > BEFORE * branch.radius + 0.3 * main.radius or gap < -AFTER * main.radius:
-        return None
-    if float((root - branch.at(end)) @ outward) < -1.3 * main.radius:
+    sine = math.sin(angle)
+    ahead = float((root - branch.at(end)) @ outward)
+    gap = ahead - main.radius / sine
+    if gap > BEFORE * branch.radius + 0.3 * main.radius or -ahead > AFTER * (main.radius + branch.radius) / sine:
         return None
     tilts = branch.covariance[2:4, 2:4] + main.covariance[2:4, 2:4]
     std = {
         "angle_deg": math.degrees(math.sqrt(max(0.5 * float(np.trace(tilts)), 0.0))),
         "center": uncertain / ON_SURFACE,
     }
-    return Branching(j, i, end, center, root, angle, gap, std)
+    surface = root - main.radius / sine * outward
+    return Branching(j, i, end, center, root, angle, gap, surface, std)
 
 
 def _arrives(found: Branching, pipes: list[Pipe], near: Surroundings) -> bool:

@@ -56,7 +56,7 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
     out, more = [], []
     for one in pipes:
         pipe = one
-        rough = is_rough(pipe, near)
+        rough = not is_unsure(pipe) and is_rough(pipe, near)
         pieces = [] if rough else _pieces(pipe, near, [other for other in pipes if other is not pipe], DEPTH)
         if any(is_rough(piece, near) for piece in pieces):
             pieces = []
@@ -134,9 +134,14 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
     return [best, *_rest(pipe, best, near, others, depth)]
 
 
+def is_unsure(pipe: Pipe) -> bool:
+    """Return whether the radius of a pipe is so uncertain that it may be several pipes taken for one."""
+    return math.sqrt(max(float(pipe.covariance[4, 4]), 0.0)) >= UNSURE * pipe.radius
+
+
 def _sure(pipe: Pipe, points: FloatArray, own: FloatArray, foreign: MaskArray, noise: float) -> Pipe:
     """Return a pipe as that of its parts that is borne out best, if it may be several pipes taken for one."""
-    if math.sqrt(max(float(pipe.covariance[4, 4]), 0.0)) < UNSURE * pipe.radius:
+    if not is_unsure(pipe):
         return pipe
     spread = max(LEAST_SPREAD * pipe.radius, min(noise, pipe.spread))
     best, most = pipe, -math.inf

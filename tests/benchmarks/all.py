@@ -32,6 +32,7 @@ QUICK = {
     "recall-outliers": "recall.py --only outliers --trials 10",
     "sources": "sources.py --trials 3",
     "negatives": "negatives.py --max-found 0",
+    "piping": "piping.py --bars",
     "cans": "scenes.py scenes/five?.ply scenes/pair?.ply --min-f1 1",
     "pair": "pair.py scenes/pair?.ply scenes/half?.ply --max-angle 0.1",
     "mug": "mug.py --max-angle 1.5 --max-radius 1",
