@@ -2,6 +2,7 @@
 
 import inspect
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -20,6 +21,11 @@ settings.load_profile("same")
 # a worker for each core, and no more threads: small matrices take twice as long where threads wait for one another
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# what a shell runs in the background ignores them, and so would all that the tests start; handlers are not inherited
+for name, handler in (("SIGINT", signal.default_int_handler), ("SIGHUP", lambda *_: None)):
+    if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is signal.SIG_IGN:
+        signal.signal(getattr(signal, name), handler)
+
 KERNELS = Path(__file__).resolve().parents[1] / ".pytest_cache" / "kernels"
 os.environ["NUMBA_CACHE_DIR"] = str(KERNELS)
 
@@ -34,6 +40,15 @@ def pytest_sessionstart(session):
     if (getattr(session.config.option, "numprocesses", None) or 0) > 1 and not hasattr(session.config, "workerinput"):
         code = "from cylx.api.warmup import *; compile_kernels(SilentObserver())"
         subprocess.run([sys.executable, "-c", code], cwd=Path(__file__).resolve().parents[1], check=False)
+
+
+SLOW = ("tests/test_docs_run.py", "tests/tiles/", "tests/cli/test_extract_tiles.py", "tests/faults/test_kills.py")
+"""What begins with these goes first, so that no worker is left alone with one of them in the end."""
+
+
+def pytest_collection_modifyitems(items):
+    """Put the slow tests first."""
+    items.sort(key=lambda item: not item.nodeid.startswith(SLOW))
 
 
 def pytest_addoption(parser):

@@ -11,6 +11,8 @@ from cylx.optional.extras import require
 
 Work = Callable[[int], int]
 
+_CALLED = "10s"
+"""How long a scheduler is called."""
 _LOOK_UP = 1.0
 """Seconds between two looks at whether somebody wants to stop."""
 
@@ -51,7 +53,7 @@ class Cluster:
         from distributed import Client  # noqa: PLC0415  an extra
 
         try:
-            self._client: Any = Client(address, timeout="10s", set_as_default=False)
+            self._client: Any = Client(address, timeout=_CALLED, set_as_default=False)
         except (OSError, ValueError) as error:
             fault = f"does not answer: {' '.join(str(error).split())[:100]}"
             raise UsageError(f"--scheduler {address}", fault, "check its address, and that it runs") from None

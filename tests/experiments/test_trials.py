@@ -70,7 +70,7 @@ def test_what_finds_nothing_has_no_errors(answer):
 
 def test_the_direction_of_an_axis_has_no_sign(answer):
     answer((Cylinder((0, 0, 1), (0, 0, -1), 1.0, 4.0), 9))
-    assert run_trial(CELL, 0, None)[:4] == (1, 0.0, 0.0, 0.0)
+    assert run_trial(CELL, 0, None)[:4] == pytest.approx((1, 0.0, 0.0, 0.0), abs=1e-6)
 
 
 CAN_CELL = Cell("", "gt", 1.0, "gt", (("share", 1.0),))
@@ -83,12 +83,12 @@ def test_the_angle_of_two_cans_is_that_of_the_cylinders_through_their_middles(an
     upright, tilted = (0, 0, 1), (0, math.sin(0.1), math.cos(0.1))
     first, second = (Cylinder(center, upright, 0.033, 0.1) for center in centers)
     answer((first, 50), (second, 40))
-    assert run_trial(CAN_CELL, 0, scan)[:2] == (2, 0.0)
+    assert run_trial(CAN_CELL, 0, scan)[:2] == pytest.approx((2, 0.0), abs=1e-6)
     answer((replace(first, direction=np.array(tilted)), 50), (second, 40))
     assert run_trial(CAN_CELL, 0, scan).angle_deg == pytest.approx(math.degrees(0.1))
     # of two at one place that with more points counts; what goes past the middle, or ends before it, does not
     answer((replace(first, direction=np.array(tilted)), 50), (first, 60), (second, 40))
-    assert run_trial(CAN_CELL, 0, scan).angle_deg == 0.0
+    assert run_trial(CAN_CELL, 0, scan).angle_deg == pytest.approx(0.0, abs=1e-6)
     beside = replace(second, point=second.point + np.array([0.02, 0, 0]))
     above = replace(second, point=second.point + np.array([0, 0, 0.1]))
     for lost in (beside, above):

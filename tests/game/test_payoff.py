@@ -80,7 +80,7 @@ def test_who_plays_with_whom_in_the_paper(other, parents, plays):
 
 def test_equal_candidates_of_different_slices_have_payoff_one():
     models = np.array([model((1, 2, 3)), model((1, 2, 3), -Z)])
-    assert screw_payoff(models, np.array([0, 1]), 5.0, 0.9)[0, 1] == 1.0
+    assert screw_payoff(models, np.array([0, 1]), 5.0, 0.9)[0, 1] == pytest.approx(1.0, rel=1e-7)
 
 
 def test_the_scale_of_the_payoff_is_lambda():
@@ -181,7 +181,7 @@ def test_long_candidates_reach_further():
     models = np.array([model(), model((0, 0, 9))])
     for extents, value in (((0, 0), 0.0), ((8.9, 8.9), 0.0), ((9.1, 0), 1.0), ((0, 9.1), 1.0)):
         payoff = local_payoff(models, np.arange(2), np.array(extents, dtype=float), 0.05, 0.1, 0.06, 0.5)
-        assert dense(payoff, 2)[0, 1] == value
+        assert dense(payoff, 2)[0, 1] == pytest.approx(value, rel=1e-9, abs=0)
 
 
 def test_nobody_plays_alone():

@@ -41,7 +41,8 @@ def test_a_direction_is_one_whatever_its_length_and_sign(vector, scale):
 
 def test_many_directions_at_once_are_the_same_as_one_by_one():
     rows = np.array([[0.0, 0, -3], [1, 2, -2], [-1, 0, 1], [-5, 4, 3]])
-    assert np.array_equal(canonical_direction(rows), [canonical_direction(row) for row in rows])
+    one_by_one = [canonical_direction(row) for row in rows]
+    assert np.allclose(canonical_direction(rows), one_by_one, rtol=0, atol=1e-15)
     assert canonical_direction(rows).tolist()[0] == [0.0, 0.0, 1.0]
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from cylx.geometry.cylinder import coordinates_of, points_on
-from cylx.geometry.extent import LEAST_POINTS_OF_EXTENT, visible_extent
+from cylx.geometry.extent import LEAP, LEAST_POINTS_OF_EXTENT, visible_extent
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=50, deadline=None)
@@ -52,7 +52,7 @@ def test_the_ends_are_mirrored_with_the_heights_and_do_not_know_order_or_unit(se
     half, scale, order = 0.3 * (high - low), np.exp(rng.uniform(-5, 5)), rng.permutation(len(heights))
     ends = np.array(visible_extent(heights, angles, half, 1.0))
     assert np.allclose(visible_extent(-heights, angles, half, 1.0), -ends[::-1], rtol=0, atol=1e-12)
-    assert visible_extent(heights[order], angles[order], half, 1.0) == tuple(ends)
+    assert np.allclose(visible_extent(heights[order], angles[order], half, 1.0), ends, rtol=0, atol=1e-12)
     assert np.allclose(visible_extent(scale * heights, angles, scale * half, scale), scale * ends, rtol=1e-9)
 
 
@@ -104,7 +104,7 @@ def test_a_disc_is_as_high_as_its_points(seed, height, power):
 
 
 @laws
-@given(seeds, st.floats(0.05, 0.3), st.floats(1.0, 2.5))
+@given(seeds, st.floats(0.05, 0.3), st.floats(LEAP * 1.5 * 0.3 + 0.05, 2.5))  # pieces are quarters of a disc's height
 def test_two_discs_on_one_axis_are_not_bridged(seed, height, gap):
     rng = np.random.default_rng(seed)
     one = surface(rng, 1500, 2 * np.pi, -0.5 * height, 0.5 * height)

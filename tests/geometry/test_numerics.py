@@ -176,7 +176,7 @@ def test_it_is_the_general_one_with_its_broadcasting(one, other, seed):
     found = cross(a, b)
     assert found.shape == expected.shape
     assert found.dtype == np.float64
-    assert np.array_equal(found, expected)
+    assert np.allclose(found, expected, rtol=0, atol=1e-14)
 
 
 @settings(max_examples=50, deadline=None)

@@ -57,16 +57,16 @@ def test_a_disc_is_found_by_its_rim(seed):
 @pytest.mark.parametrize("sigma", [0.0, 0.003])
 def test_the_walls_of_an_open_tube_are_two_cylinders(inner, sigma):
     rng = np.random.default_rng(3)
-    tube = np.concatenate([wall(6000, 1.0, 4.0, rng), wall(5000, inner, 4.0, rng)])
+    tube = np.concatenate([wall(3500, 1.0, 4.0, rng), wall(3000, inner, 4.0, rng)])
     assert radii(extract(noisy(tube, sigma, rng))) == pytest.approx([inner, 1.0], rel=0.005)
 
 
 @pytest.mark.parametrize("sigma", [0.002, 0.006])
 def test_a_pipe_that_lies_on_a_floor_is_a_cylinder(sigma):
     rng = np.random.default_rng(4)
-    pipe = wall(5000, 0.3, 5.0, rng)
+    pipe = wall(3500, 0.3, 5.0, rng)
     pipe = np.column_stack([pipe[:, 2] - 2.5, pipe[:, 0], pipe[:, 1] + 0.3])
-    found = extract(noisy(np.concatenate([face(9000, 8.0, 0.0, rng), pipe]), sigma, rng))
+    found = extract(noisy(np.concatenate([face(5000, 8.0, 0.0, rng), pipe]), sigma, rng))
     assert radii(found) == pytest.approx([0.3], rel=0.01)
     assert not found.blends
 
@@ -96,10 +96,9 @@ def test_bark_makes_no_tree_less_of_a_stem(roughness):
     assert found.cylinders[0].cylinder.height == pytest.approx(6.0, rel=0.05)
 
 
-@pytest.mark.parametrize("factor", [1 / 3, 1.0, 3.0])
-def test_a_noise_that_is_given_wrong_by_three_changes_nothing(factor):
+@pytest.mark.parametrize("given", [["scene.noise=0.0033"], ["scene.noise=0.01"], ["scene.noise=0.03"], []])
+def test_a_noise_that_is_given_wrong_by_three_changes_nothing(given):
     rng = np.random.default_rng(5)
-    scene = [wall(6000, 0.5, 3.0, rng, (-1.5, 0)), wall(4000, 0.25, 3.0, rng, (1.5, 0)), face(9000, 9.0, 0.0, rng)]
+    scene = [wall(4000, 0.5, 3.0, rng, (-1.5, 0)), wall(2500, 0.25, 3.0, rng, (1.5, 0)), face(5000, 9.0, 0.0, rng)]
     points = noisy(np.concatenate(scene), 0.01, rng)
-    assert radii(extract(points, overrides=[f"scene.noise={0.01 * factor:g}"])) == pytest.approx([0.25, 0.5], rel=0.01)
-    assert radii(extract(points)) == pytest.approx([0.25, 0.5], rel=0.01)
+    assert radii(extract(points, overrides=given)) == pytest.approx([0.25, 0.5], rel=0.01)

@@ -151,7 +151,8 @@ def test_the_unit_and_the_order_do_not_matter(name):
 
 @pytest.mark.parametrize("name", ["steps on all axes", "steps of z", "single precision", "all points twice"])
 def test_the_remedy_helps(name):
-    points, (kind,) = bad_clouds(PIPES[::2])[name]
+    few = 2 if name == "single precision" else 3  # of fewer points some are seen in spite of it
+    points, (kind,) = bad_clouds(PIPES[::few])[name]
     points = np.vstack([points] * (3 if kind == "copies" else 1))  # six times each
     before = extract(points)
     assert len(before.cylinders) == (6 if kind == "copies" else 0)  # copies are told before anything is measured

@@ -10,6 +10,8 @@ import contextlib
 import hashlib
 import io
 import json
+import multiprocessing.connection
+import multiprocessing.context
 import os
 import pickle
 import signal
@@ -101,6 +103,28 @@ class Recorder:
         return tell
 
 
+class WithoutCloud(pickle.Pickler):
+    """Leaves out the cloud of an extraction."""
+
+    def __init__(self, file, cloud):
+        super().__init__(file)
+        self.cloud = cloud
+
+    def persistent_id(self, one):
+        return "the cloud" if one is self.cloud else None
+
+
+class WithCloud(pickle.Unpickler):
+    """Puts the cloud of an extraction where it was left out."""
+
+    def __init__(self, file, cloud):
+        super().__init__(file)
+        self.cloud = cloud
+
+    def persistent_load(self, _):
+        return self.cloud
+
+
 def remembered(extract, folder):
     """Return a function that keeps what an extraction gives, as the same points and settings give the same."""
     from cylx.records import SilentObserver
@@ -112,24 +136,39 @@ def remembered(extract, folder):
         path = folder / hashlib.sha256(b"|".join([cloud.points.tobytes(), valid, about])).hexdigest()
         if path.is_file():
             with path.open("rb") as file:
-                unpickler = pickle.Unpickler(file)
-                unpickler.persistent_load = lambda _: cloud
-                found, told = unpickler.load()
+                found, told = WithCloud(file, cloud).load()
             for name, args in told:
                 getattr(observer, name)(*args)
             return found
         recorder = Recorder(observer)
         found = extract(cloud, config, threads=threads, observer=recorder)
         kept = io.BytesIO()
-        pickler = pickle.Pickler(kept)
-        pickler.persistent_id = lambda one: "the cloud" if one is cloud else None
-        pickler.dump((found, recorder.told))
+        WithoutCloud(kept, cloud).dump((found, recorder.told))
         temporary = path.with_suffix(f".{os.getpid()}")
         temporary.write_bytes(kept.getvalue())
         temporary.replace(path)
         return found
 
     return extract_once
+
+
+def forks():
+    """Return what starts the processes of a command as copies of its own, which are warm and remember, too."""
+
+    class Copy(multiprocessing.context.ForkProcess):
+        def run(self):
+            # the other ends of pipes are not for copies: who reads from one is to notice that its owner has closed it
+            mine = {one.fileno() for one in self._args if isinstance(one, multiprocessing.connection.Connection)}
+            for path in list(Path("/proc/self/fd").iterdir()):
+                with contextlib.suppress(OSError):  # the folder itself
+                    if int(path.name) not in mine and str(path.readlink()).startswith("socket:"):
+                        os.close(int(path.name))
+            super().run()
+
+    class Copies(multiprocessing.context.ForkContext):
+        Process = Copy
+
+    return Copies()
 
 
 def load(folder):
@@ -139,6 +178,8 @@ def load(folder):
 
     warmup.extract_cylinders(warmup.PointCloud(warmup.practice_cloud()), warmup.Config(), threads=1)
     cylx.pipeline.extract_cylinders = remembered(cylx.pipeline.extract_cylinders, folder)
+    copies = forks()
+    multiprocessing.get_context = lambda kind: copies
     assert threading.active_count() == 1, "a process with threads cannot be forked"
 
 
