@@ -81,6 +81,10 @@ def trace_runs(
     add_collars(trace, near)
     add_gaps(trace, near)
     add_caps(trace, near)
-    trace = in_order(drop_parts(trace))
+    trace = drop_parts(trace)
+    # a bend that was taken for two has both its pipes again
+    add_bends(trace, near)
+    add_reducers(trace, near)
+    trace = in_order(trace)
     runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)
     return answer_of(trace, runs, fits, near)

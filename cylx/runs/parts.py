@@ -41,9 +41,14 @@ def drop_parts(trace: Trace) -> Trace:
     parts |= {k for k, pipe in enumerate(trace.pipes) if _is_remnant(pipe, trace)}
     kept = [k for k in range(len(trace.pipes)) if k not in parts]
     number = {old: new for new, old in enumerate(kept)}
-    out = Trace([trace.pipes[k] for k in kept], trace.near)
+    near = trace.near
+    for k in parts:
+        near.label(np.flatnonzero(near.labels == trace.pipes[k].label), -1)
+    others = frozenset(number[k] for k in trace.others if k in number)
+    out = Trace([trace.pipes[k] for k in kept], near, others=others, followed=set())
     for fitting, points in zip(trace.fittings, trace.points, strict=True):
         if parts.intersection(fitting.joins):
+            near.label(points, -1)
             continue
         moved = replace(fitting, joins=tuple(number[k] for k in fitting.joins))
         if isinstance(moved, Junction):
