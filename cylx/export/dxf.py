@@ -82,7 +82,9 @@ def _add(space: Any, part: Part) -> None:  # noqa: ANN401  has no types
         end = begin + degrees(bend.angle)
         lines.append(space.add_arc(center, bend.bend_radius, begin, end, dxfattribs=placed))
     for path in () if bends else part.lines:
-        lines += [space.add_line(first.tolist(), second.tolist(), dxfattribs=look) for first, second in pairwise(path)]
+        for first, second in pairwise(path):
+            if (first != second).any():
+                lines.append(space.add_line(first.tolist(), second.tolist(), dxfattribs=look))
     number = part.cylinder.id if part.cylinder is not None else part.fitting.id if part.fitting is not None else -1
     radius = max(map(radius_of, part.solids), default=max(port.radius for port in part.ports))
     for line in lines:

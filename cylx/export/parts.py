@@ -182,11 +182,10 @@ def _rod(start: FloatArray, end: FloatArray, radius: float) -> Solid | None:
 def _mitre(elbow: ResultElbow, ports: Sequence[Port]) -> tuple[tuple[Solid | None, ...], tuple[Path, ...]]:
     """Return the solid and the line of an elbow without a torus."""
     (first, second), radius = ports, elbow.radius
-    legs = [port.place - np.array(elbow.center) for port in ports]
     # the corner is where the lines of both pipes go, which are their ports' directions backwards
     turn = float(np.arccos(np.clip(-first.outward @ second.outward, -1.0, 1.0)))
     apart = float(np.linalg.norm(second.place - first.place))
-    if apart <= TINY * radius or turn < 1e-6 or turn > np.pi - 0.1 or not any(leg.any() for leg in legs):
+    if apart <= TINY * radius or turn < 1e-6 or turn > np.pi - 0.1:
         return (_rod(first.place, second.place, radius),), ((first.place, second.place),)
     reach = 0.5 * apart / np.cos(0.5 * turn)
     corner = 0.5 * (first.place - reach * first.outward + second.place - reach * second.outward)

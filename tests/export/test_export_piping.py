@@ -297,6 +297,27 @@ def test_pcf_of_cylinders_alone_has_a_pipeline_for_each():
 # --- all formats
 
 
+def test_a_joint_without_a_gap_has_no_body_and_still_joins():
+    def closed(cylinders, fittings, runs):
+        place = {"end": fittings[9].start, "length": 0.0}
+        return cylinders, [one.model_copy(update=place) if one.id == 9 else one for one in fittings], runs
+
+    assert "joint 9" not in {body.name for body in drawing_of(change=closed).bodies}
+    _, pipelines = read_pcf(export(".pcf", change=closed))
+    before, after = (
+        next(one for one in pipelines["run-0"] if one.values["COMPONENT-ATTRIBUTE1"] == name)
+        for name in ("cylinder 8", "cylinder 9")
+    )
+    assert min(np.linalg.norm(one - two) for one in before.ends for two in after.ends) < 1e-3
+    ifcopenshell, ezdxf = library(".ifc"), library(".dxf")
+    model = ifcopenshell.file.from_string(export(".ifc", change=closed).decode())
+    (joint,) = (one for one in model.by_type("IfcPipeFitting") if one.Name == "joint 9")
+    assert joint.Representation is None
+    assert len(model.by_type("IfcRelConnectsPorts")) == LINKS
+    document = ezdxf.read(io.StringIO(export(".dxf", change=closed).decode()))
+    assert (document.audit().errors, document.audit().fixes) == ([], [])
+
+
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".glb", ".stl", ".csv", ".ifc", ".dxf", ".pcf"])
 def test_the_same_piping_gives_the_same_bytes_and_other_bytes_than_cylinders_alone(suffix):
     library(suffix)
