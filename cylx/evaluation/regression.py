@@ -166,7 +166,8 @@ def _differences(
     """Yield the differences of a pair of cylinders that exceed their tolerances."""
     i, j = pair
     heights, inliers = (left.heights[i], right.heights[j]), (left.inliers[i], right.inliers[j])
-    height = abs(heights[0] - heights[1]) / max(_lengths(left)[i], _lengths(right)[j])
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        height = abs(heights[0] - heights[1]) / max(_lengths(left)[i], _lengths(right)[j])
     count = abs(inliers[0] - inliers[1]) / max(*inliers, 1.0)
     measured: tuple[tuple[Kind, str, tuple[float, float] | None, float, float], ...] = (
         ("moved", "angle_deg", None, errors.angle_deg[pair], tolerances.angle_deg),

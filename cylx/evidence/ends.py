@@ -8,7 +8,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import coordinates_of
-from cylx.records import Finding, IndexedCloud, Segment
+from cylx.records import Finding, IndexedCloud
 
 LEAST_COVERAGE = math.radians(300.0)
 """What hides the middle of a pipe hides it from one side. Of a piece seen all round nothing is hidden at its end."""
@@ -20,8 +20,10 @@ GAPS_OF_POINTS, ALLOWED_RADII = 3.0, 0.05
 """They do if within so many usual gaps between points and this share of the radius."""
 RIM_RADII, BESIDE_RADII = 0.15, 0.3
 """What adjoins an end lies within so many radii of it, along and across the axis,"""
+RIM_DEVIATIONS, RIM_SPACINGS, MOST_RADII = 3.0, 2.0, 0.8
+"""or within so many deviations of the points and of their spacings, where that is more, but within so many radii:"""
 OFF_DEVIATIONS, OFF_RADII = 4.0, 0.03
-"""off the surface by more than this,"""
+"""it lies off the surface by more than this,"""
 ADJOINED_SHARE = 0.7
 """and in this share of the sectors. A pipe whose middle nobody saw ends in nothing."""
 TELLING_SHARE = 0.6
@@ -72,17 +74,32 @@ def ends_in_cut(finding: Finding, indexed: IndexedCloud, upper: bool, most: floa
     np.maximum.at(ends, sectors, heights)
     if (ends[full] > segment.half - allowed).mean() < CLEAN_SHARE:
         return False
-    return _adjoins(segment, indexed, upper, int(full.sum()))
+    return _adjoins(finding, indexed, upper, int(full.sum()))
 
 
-def _adjoins(segment: Segment, indexed: IndexedCloud, upper: bool, covered: int) -> bool:
+def rim_height(finding: Finding) -> float:
+    """Return how far along the axis, from an end, what adjoins it may lie; frame units."""
+    return _within(RIM_RADII, RIM_DEVIATIONS, finding)
+
+
+def _adjoins(finding: Finding, indexed: IndexedCloud, upper: bool, covered: int) -> bool:
     """Return whether something adjoins an end all round: a plate about the mouth of a bore, a cap of a pin."""
+    segment = finding.segment
     radius, end = segment.radius, segment.half if upper else -segment.half
-    along, across = RIM_RADII * radius, BESIDE_RADII * radius
+    along, across = rim_height(finding), _within(BESIDE_RADII, OFF_DEVIATIONS, finding)
     near = indexed.cells.near_cylinder(segment.model, end - along, end + along, radius - across, radius + across)
     _, residuals, angles = coordinates_of(indexed.points, near, segment.model)
     beside = np.abs(residuals) > max(OFF_DEVIATIONS * segment.spread, OFF_RADII * radius)
     return len(np.unique(_sectors_of(angles[beside]))) >= ADJOINED_SHARE * covered
+
+
+def _within(radii: float, deviations: float, finding: Finding) -> float:
+    """Return how far what adjoins an end may lie from it, frame units."""
+    segment = finding.segment
+    area = 2.0 * segment.half * segment.radius * finding.coverage
+    spacing = math.sqrt(area / max(len(finding.points), 1))
+    told = deviations * segment.spread + RIM_SPACINGS * spacing
+    return min(max(radii * segment.radius, told), MOST_RADII * segment.radius)
 
 
 def _sectors_of(angles: FloatArray) -> IndexArray:

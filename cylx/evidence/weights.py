@@ -63,6 +63,9 @@ THIN = 20.0
 """Radius over scatter up to which a flank counts in full."""
 BEHIND = 0.7
 """Angle (radians) that must be covered behind a flank for it not to count at all."""
+PRISM = 0.6
+"""Share of the deviation of form that makes a prism of a cylinder, whether or not the noise hides its faces: no real
+cylinder among those of the rows has so much of it."""
 LEAST_SCATTER = 1e-4
 """Scatter in radii below which nothing is told apart."""
 
@@ -86,7 +89,7 @@ def _misfit(measures: Mapping[str, float]) -> float:
 def _explained(measures: Mapping[str, float]) -> float:
     """Return the share of the deviation of form that another shape explains, beyond what chance brings."""
     share = measures["explained"]
-    if measures["facets"] > 0.5:
+    if measures["facets"] > 0.5 or measures["prism"] > PRISM:
         share = max(share, measures["prism"])
     return max(0.0, share - 0.3) * min(1.0, measures["structure_radii"] / 0.01)
 

@@ -11,36 +11,29 @@ from cylx.geometry.cylinder import RADIUS, UX, UY, UZ
 from cylx.geometry.kernels import njit
 from cylx.records import Candidates, Segment
 
-LEAST_TELLING_SHARE = 0.4
+LEAST_TELLING_SHARE = 0.1
 """Windows below this many radii see dents and rims of real objects rather than the cylinder. Short cylinders need
 smaller windows."""
 CONCENTRIC = 0.85
 """A candidate on the same axis outside this ratio of radii belongs to another surface."""
 LIKE_RADIUS = 0.4
 """A candidate outside this ratio of radii belongs to another object, or to a detail: a rim, a dent, an edge."""
-RISE, LARGEST, ENOUGH_WINDOWS = 8.0, 0.9, 8
-"""A window can tell a rough surface if the surface rises in it by this many deviations, or if it has this size in
-radii; smaller windows count where there are fewer than this many of such."""
+LARGEST, ENOUGH_WINDOWS, SCALES = 0.9, 8, 8
+"""A window of this size in radii always tells; a scale must have so many windows to be looked at by itself; and windows
+are sorted into so many scales, each twice as large, the first being the smallest that can tell."""
+BLUR, SHARP = 2.0, 0.08
+"""The curvature that n points of a round window of radius w show has a standard deviation of `BLUR` deviations of the
+points over w² √n (least squares, points spread evenly). A window can tell a radius if that is no more than this share
+of the curvature, or if the window has the size `LARGEST`."""
 BESIDE = 0.15
-"""A window within this many radii of a surface was laid on it."""
+"""A window within this many radii of a rough average was laid on its surface."""
+OTHER_WALL, OTHER_WALL_DEVIATIONS = 0.03, 5.0
+"""Of a fitted surface a window further off than this share of the radius, and than so many deviations, was laid on
+another wall."""
 TOUCHING = 0.25
 """The axis of a window on a cylinder lies within this many radii of where the radius of the window puts it."""
 AGREEING = 0.15, math.cos(math.radians(6.0)), 0.1
 """A candidate agrees with a cylinder within this offset in radii, cosine, and relative difference of radii."""
-
-
-def least_telling(segment: Segment, *, rough: bool = False) -> float:
-    """Return the radius from which a window can identify a cylinder.
-
-    Parameters
-    ----------
-    segment : Segment
-    rough : bool
-        Whether the curve of the surface must rise above the scatter of its points.
-    """
-    least = LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half)
-    rising = min(math.sqrt(RISE * segment.spread * segment.radius), LARGEST * segment.radius)
-    return max(least, rising) if rough else least
 
 
 class Neighbourhood:
@@ -55,12 +48,15 @@ class Neighbourhood:
         self._order = np.argsort(candidates.models[:, 0], kind="stable")
         self._models = np.ascontiguousarray(candidates.models[self._order])
         self._windows = candidates.windows[self._order]
+        self._sharpness = self._windows**2 * np.sqrt(np.maximum(candidates.inliers[self._order], 1))
         self._places = np.ascontiguousarray(candidates.places[self._order])
 
     def agreement(self, segment: Segment) -> tuple[int, int]:
-        """Count the windows inside a cylinder that agree with it, and all windows inside it.
+        """Count the windows inside a cylinder that agree with it, and all windows inside it, at the best of the scales.
 
-        At the edge of a beam a few candidates agree by chance; on a pipe nearly all do.
+        At the edge of a beam a few candidates agree by chance; on a pipe nearly all do, at one scale at least. Small
+        windows see the noise, and the dents and seams of real objects; large ones see what is beside a surface as well,
+        such as the other wall of a tube.
 
         Parameters
         ----------
@@ -71,20 +67,27 @@ class Neighbourhood:
         consistent, near : int
         """
         part = self._beside(segment, segment.half)
-        consistent, near = 0, 0
-        for seen in (least_telling(segment, rough=True), least_telling(segment)):
-            consistent, near = _count_agreeing(
-                self._models[part],
-                self._windows[part],
-                self._places[part],
-                segment.model,
-                segment.half,
-                seen,
-                *AGREEING,
-            )
-            if near >= ENOUGH_WINDOWS:
-                break
-        return int(consistent), int(near)
+        beside = BESIDE * segment.radius
+        if segment.spread > 0.0:
+            beside = min(beside, max(OTHER_WALL * segment.radius, OTHER_WALL_DEVIATIONS * segment.spread))
+        counts = np.zeros((SCALES, 2), np.int64)
+        _count_agreeing(
+            self._models[part],
+            self._windows[part],
+            self._sharpness[part],
+            self._places[part],
+            segment.model,
+            segment.half,
+            LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half),
+            LARGEST * segment.radius,
+            BLUR * segment.spread * segment.radius / SHARP,
+            beside,
+            *AGREEING,
+            counts,
+        )
+        best = max((c for c in counts.tolist() if c[1] >= ENOUGH_WINDOWS), key=_share, default=None)
+        consistent, near = best or counts.sum(axis=0).tolist()
+        return consistent, near
 
     def agreeing(
         self, segment: Segment, alive: MaskArray, offset: float, angle_deg: float, radius: float
@@ -115,6 +118,10 @@ def is_contradicted(counts: tuple[int, int]) -> bool:
     return near >= 12 and consistent + math.sqrt(max(consistent, 1.0)) < 0.2 * near
 
 
+def _share(counts: list[int]) -> float:
+    return (counts[0] + 1.0) / (counts[1] + 2.0)
+
+
 @njit(cache=True, nogil=True)
 def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cosine: float, radius: float) -> int:
     """Return 1 if a candidate lies in a cylinder and has a similar radius, 2 if it also agrees, otherwise 0.
@@ -137,35 +144,41 @@ def _agrees(row: FloatArray, model: FloatArray, reach: float, offset: float, cos
 
 
 @njit(cache=True, nogil=True)
-def _is_off(place: FloatArray, model: FloatArray, reach: float) -> bool:
+def _is_off(place: FloatArray, model: FloatArray, reach: float, beside: float) -> bool:
     """Return whether a window was laid elsewhere than on the surface of a cylinder; not if its place is unknown."""
     if math.isnan(place[0]):
         return False
     dx, dy, dz = place[0] - model[0], place[1] - model[1], place[2] - model[2]
     height = dx * model[3] + dy * model[4] + dz * model[5]
     distance = math.sqrt(max(0.0, dx * dx + dy * dy + dz * dz - height * height))
-    return bool(abs(height) > reach or abs(distance - model[6]) > BESIDE * model[6])
+    return bool(abs(height) > reach or abs(distance - model[6]) > beside)
 
 
 @njit(cache=True, nogil=True)
 def _count_agreeing(
     models: FloatArray,
     windows: FloatArray,
+    sharpness: FloatArray,
     places: FloatArray,
     model: FloatArray,
     reach: float,
     seen: float,
+    large: float,
+    sharp: float,
+    beside: float,
     offset: float,
     cosine: float,
     radius: float,
-) -> tuple[int, int]:
-    consistent, near = 0, 0
+    counts: IndexArray,
+) -> None:
+    """Count, for each scale, the windows that agree, and all."""
     for i in range(len(models)):
-        if windows[i] > seen and not _is_off(places[i], model, reach):
+        telling = windows[i] > seen and (windows[i] >= large or sharpness[i] >= sharp)
+        if telling and not _is_off(places[i], model, reach, beside):
             level = _agrees(models[i], model, reach, offset, cosine, radius)
-            near += 1 if level > 0 else 0
-            consistent += 1 if level > 1 else 0
-    return consistent, near
+            scale = min(SCALES - 1, max(0, int(math.log2(windows[i] / seen))))
+            counts[scale, 1] += 1 if level > 0 else 0
+            counts[scale, 0] += 1 if level > 1 else 0
 
 
 @njit(cache=True, nogil=True)

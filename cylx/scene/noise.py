@@ -29,6 +29,9 @@ MOSTLY = 0.7
 """Share of the smallest neighbourhoods that must be wide for them to tell the noise."""
 FINER = 0.8
 """The noise is that of the smallest neighbourhoods if it is less than this share of that of the others."""
+PARTLY, MUCH_FINER = 0.4, 0.5
+"""The same where fewer are wide, down to the first share: of a thick surface the thinnest patches are thinner than it,
+but not by so much as those of a plate of which larger ones see both faces."""
 THICK_NOISE = 0.3
 """Noise in spacings from which it may be the thickness of rods that are seen all round."""
 FILAMENT = 0.3
@@ -158,8 +161,9 @@ def _finer(
 ) -> float:
     """Return the noise of the smallest neighbourhoods, or of rods, where it is clearly less than that of the others."""
     if noise > LEAST_NOISE * typical:
-        fine = _noise_of_fine(points, cells, starts, side, sample, LEAST_NOISE * typical, threads)
-        noise = fine if fine is not None and fine < FINER * noise else noise
+        fine, share = _noise_of_fine(points, cells, starts, side, sample, LEAST_NOISE * typical, threads)
+        limit = float(np.interp(share, [PARTLY, MOSTLY], [MUCH_FINER, FINER]))
+        noise = fine if fine < limit * noise else noise
     if noise > THICK_NOISE * typical:
         spreads = spreads_of_rods(points, cells, starts, side, sample[::4], threads)
         rods = finest_mode(spreads, LEAST_NOISE * typical) if len(spreads) else noise
@@ -175,15 +179,18 @@ def _noise_of_fine(
     sample: IndexArray,
     least: float,
     threads: int,
-) -> float | None:
-    """Return the noise over the smallest neighbourhoods; None if few of them are pieces of a surface."""
+) -> tuple[float, float]:
+    """Return the noise over the smallest neighbourhoods, and the share of these that are wide.
+
+    The noise is infinite if few of them are pieces of a surface.
+    """
     size = min(FINE, len(points) - 1)
     if size < 9:
-        return None
+        return math.inf, 0.0
     near, _ = nearest_points(points, cells, starts, side, sample, size, threads)
     sd, width, narrow = quadric_spread(points[near])
     surface = narrow > FILAMENT * width
     wide = surface & (width > WIDE_PATCH * sd)
-    if wide.sum() < max(MOSTLY * surface.sum(), FEW_WIDE * len(sample)):
-        return None  # of thick patches only the thinnest are wide
-    return finest_mode(sd[wide], least)
+    if wide.sum() < max(PARTLY * surface.sum(), FEW_WIDE * len(sample)):
+        return math.inf, 0.0  # of thick patches only the thinnest are wide
+    return finest_mode(sd[wide], least), float(wide.sum() / surface.sum())

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cylx.evidence.ends import ends_in_cut
+from cylx.evidence.ends import ends_in_cut, rim_height
 from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
 from cylx.geometry.coverage import sector_of
@@ -93,7 +93,7 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
     astray = np.hypot(finding.offset_error, finding.tilt_error * heights)
     on = np.abs(residuals) < 3.0 * noise + 2.0 * astray
     for sign in (-1.0, 1.0):
-        if ends_in_cut(finding, indexed, sign > 0.0) and _is_behind_gap(sign * heights[on], half):
+        if ends_in_cut(finding, indexed, sign > 0.0) and _is_behind_gap(sign * heights[on], half + rim_height(finding)):
             kept = sign * heights <= half
             near, heights, residuals, on = near[kept], heights[kept], residuals[kept], on[kept]
     fresh = (np.abs(heights) > half) & on
@@ -124,13 +124,13 @@ def _lengthened(finding: Finding, indexed: IndexedCloud, times: float) -> Segmen
     return Segment(longer, 0.5 * (high - low), spread)
 
 
-def _is_behind_gap(heights: FloatArray, half: float) -> bool:
-    """Return whether the points beyond an end begin much further from it than they are from each other."""
-    beyond = heights[heights > half]
+def _is_behind_gap(heights: FloatArray, end: float) -> bool:
+    """Return whether the points beyond an end, and what adjoins it, begin further from it than they are apart."""
+    beyond = heights[heights > end]
     if len(beyond) < 2:
         return False
     first = float(beyond.min())
-    return first - half > WIDE_GAP * (float(beyond.max()) - first) / len(beyond)
+    return first - end > WIDE_GAP * (float(beyond.max()) - first) / len(beyond)
 
 
 def _is_strip(beyond: FloatArray, before: FloatArray) -> bool:

@@ -9,7 +9,7 @@ from cylx.evidence.weights import BLEND_TERMS, TERMS, weigh, weigh_blend
 
 EDGE = dict(  # noqa: C408  keys without quotes read better
     scatter_radii=1 / 9, form_radii=0.0, roughness=1.0, noise_ratio=1.0, lack_of_fit=1.0, structure=0.0,
-    structure_radii=0.0, ovality=0.0, explained=0.0, facets=0.0, deviation_radii=1 / 9, inside=0.0, outside=0.0,
+    structure_radii=0.0, ovality=0.0, explained=0.0, facets=0.0, prism=0.0, deviation_radii=1 / 9, inside=0.0, outside=0.0,
     tangent=0.0, tangent_both=0.0, flank=0.3, coverage=3.0, inliers=90.0, places=12.0, curvature=90.0,
     radius_noises=9.0, height_radii=9.0, windows=20.0, payoff=0.8, agreement=0.8, slope=0.0, slope_error=0.01,
     bulge=0.0, bulge_error=0.01, bend=0.0, bend_error=0.01,
@@ -102,3 +102,10 @@ def test_a_blend_may_go_on_tangentially():
     on = {"tangent": 1.0, "tangent_both": 0.9, "flank": 0.0, "payoff": 0.9}
     assert weigh_blend({**EDGE, **on}) == weigh_blend({**EDGE, **on, "tangent": 0.0, "tangent_both": 0.0})
     assert weigh({**EDGE, **on})[0] < weigh({**EDGE, **on, "tangent": 0.0, "tangent_both": 0.0})[0]
+
+
+@pytest.mark.parametrize("facets", [0.0, 1.0])
+def test_a_prism_is_refused_whether_or_not_the_noise_hides_its_faces(facets):
+    # the deviations of a cylinder out of round are explained by no prism
+    rounded = {"flank": 0.0, "coverage": 6.3, "inliers": 900.0, "structure_radii": 0.02, "facets": facets}
+    assert confidence(**rounded, prism=0.95) < 0.5 < confidence(**rounded, prism=0.3)

@@ -11,6 +11,7 @@ from cylx.game.agreement import (
     AGREEING,
     BESIDE,
     CONCENTRIC,
+    ENOUGH_WINDOWS,
     LEAST_TELLING_SHARE,
     LIKE_RADIUS,
     TOUCHING,
@@ -73,13 +74,13 @@ def touching(models, segment):
 
 @laws
 @given(seeds)
-def test_agreement_is_that_of_all_candidates(seed):
+def test_agreement_is_that_of_all_candidates_of_the_best_scale(seed):
     rng = np.random.default_rng(seed)
     segment = a_segment(rng)
     candidates = candidates_about(rng, segment)
     heights, apart = distances(candidates.points, segment)
-    telling = candidates.windows > LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half)
-    near = telling & (np.abs(heights) < segment.half) & (apart < segment.radius)
+    least = LEAST_TELLING_SHARE * min(segment.radius, 1.2 * segment.half)
+    near = (candidates.windows > least) & (np.abs(heights) < segment.half) & (apart < segment.radius)
     near &= touching(candidates.models, segment)
     # a pipe on the same axis that is much thinner or thicker is another one
     ratio = candidates.radii / segment.radius
@@ -87,8 +88,53 @@ def test_agreement_is_that_of_all_candidates(seed):
     near &= ~(
         same(candidates.models, segment, *AGREEING[:2], np.inf) & ((ratio <= CONCENTRIC) | (ratio >= 1 / CONCENTRIC))
     )
-    expected = int((near & same(candidates.models, segment, *AGREEING)).sum()), int(near.sum())
+    agreeing = near & same(candidates.models, segment, *AGREEING)
+    scales = np.clip(np.log2(candidates.windows / least), 0, 7).astype(int)
+    counts = [(int(agreeing[scales == k].sum()), int(near[scales == k].sum())) for k in range(8)]
+    told = [count for count in counts if count[1] >= ENOUGH_WINDOWS]
+    expected = max(told, key=lambda c: (c[0] + 1) / (c[1] + 2)) if told else (int(agreeing.sum()), int(near.sum()))
     assert Neighbourhood(candidates).agreement(segment) == expected
+
+
+UPRIGHT = np.array([0.0, 0, 0, 0, 0, 1, 1])
+"""A cylinder of radius 1 about the z axis."""
+
+
+def windows_on(model, count, *, size, inliers=100, radius=1.0):
+    """Give windows laid evenly about a cylinder, of a size and a number of points, that say one radius."""
+    turns = 2 * np.pi * np.arange(count) / count
+    out = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(count)])
+    models = np.column_stack([(model[6] - radius) * out, np.tile(model[3:6], (count, 1)), np.full(count, radius)])
+    return Candidates(
+        models, np.arange(count), np.zeros(count), np.full(count, inliers), np.full(count, size), model[6] * out
+    )
+
+
+def test_one_scale_at_which_the_windows_agree_is_enough():
+    # large windows on the wall of a tube see its other wall, too: they say another radius
+    segment = Segment(UPRIGHT, 2.0, 0.001)
+    good, mixed = windows_on(UPRIGHT, 20, size=0.2), windows_on(UPRIGHT, 40, size=0.6, radius=0.85)
+    assert Neighbourhood(Candidates.joined([good, mixed])).agreement(segment) == (20, 20)
+    assert Neighbourhood(mixed).agreement(segment) == (0, 40)
+
+
+@pytest.mark.parametrize("spread", [1e-4, 1e-3])
+def test_windows_on_the_other_wall_have_no_say(spread):
+    segment = Segment(UPRIGHT, 2.0, spread)
+    inner = windows_on(np.array([0.0, 0, 0, 0, 0, 1, 0.88]), 40, size=0.2, radius=0.88)
+    assert Neighbourhood(inner).agreement(segment) == (0, 0)
+    assert Neighbourhood(Candidates.joined([inner, windows_on(UPRIGHT, 9, size=0.2)])).agreement(segment) == (9, 9)
+    # of a rough average, which has no spread yet, nobody knows on which wall it lies
+    assert Neighbourhood(inner).agreement(Segment(UPRIGHT, 2.0, 0.0)) == (0, 40)
+
+
+@pytest.mark.parametrize(("inliers", "told"), [(25, False), (100, False), (2500, True)])
+def test_windows_that_the_noise_blurs_have_no_say(inliers, told):
+    # 2 deviations over w^2 sqrt(n) is to be 0.08 of the curvature at most
+    segment = Segment(UPRIGHT, 2.0, 0.04)
+    blurred = windows_on(UPRIGHT, 20, size=0.2, inliers=inliers, radius=0.7)
+    assert (Neighbourhood(blurred).agreement(segment)[1] > 0) == told
+    assert Neighbourhood(windows_on(UPRIGHT, 20, size=0.95, inliers=inliers)).agreement(segment) == (20, 20)
 
 
 @laws

@@ -51,3 +51,27 @@ def test_unit_place_and_attitude_change_little(noise):
     assert there.spacing == pytest.approx(1e3 * here.spacing, rel=0.05)
     # a power of two changes nothing at all
     assert measure_scene(1024 * points).noise == pytest.approx(1024 * here.noise, rel=1e-9)
+
+
+def thin_plate(thickness, seed, side=60):
+    """Draw from both faces of a plate; lengths in spacings."""
+    rng = np.random.default_rng(seed)
+    count = 2 * side * side
+    return np.column_stack([side * rng.random((count, 2)), thickness * rng.integers(0, 2, count)])
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("thickness", [2.5, 3.0, 6.0])
+@pytest.mark.parametrize("noise", [0.05, 0.2])
+def test_the_noise_of_a_thin_plate_is_not_its_thickness(noise, thickness, seed):
+    points = thin_plate(thickness, seed)
+    scene = measure_scene(points + noise * np.random.default_rng([7, seed]).standard_normal(points.shape))
+    assert scene.noise == pytest.approx(noise, rel=0.35)
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("noise", [0.3, 0.5, 0.8, 1.5])
+def test_a_thick_surface_is_not_as_thin_as_its_thinnest_patches(noise, seed):
+    points = thin_plate(0.0, seed)
+    scene = measure_scene(points + noise * np.random.default_rng([7, seed]).standard_normal(points.shape))
+    assert scene.noise == pytest.approx(noise, rel=0.2)
