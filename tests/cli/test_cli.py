@@ -15,7 +15,7 @@ from cylx.cli.terminal import failures
 from cylx.cli.terminal.group import LazyGroup
 from cylx.errors import BatchError, ConfigError, InputError, NothingFoundError, OutputError, UsageError
 
-COMMANDS = ["extract", "view", "info", "config", "synth", "evaluate", "diff", "export", "doctor", "reproduce"]
+COMMANDS = ["extract", "runs", "view", "info", "config", "synth", "evaluate", "diff", "export", "doctor", "reproduce"]
 LEAVES = [
     *(["extract"], ["info"], ["evaluate"], ["diff"], ["export"], ["doctor"]),
     *(["config", name] for name in ("init", "show", "check", "schema")),

@@ -77,9 +77,8 @@ def test_all_kinds_are_written_and_read_back():
     document = written()
     jsonschema.validate(document, result_schema())
     assert Result.parse(document, "it").to_object() == document
-    assert {one["kind"] for one in document["fittings"]} == set(
-        "elbow tee cross reducer flange inline cap joint".split()
-    )
+    kinds = {"elbow", "tee", "cross", "reducer", "flange", "inline", "cap", "joint"}
+    assert {one["kind"] for one in document["fittings"]} == kinds
 
 
 @pytest.mark.parametrize("fitting", FITTINGS, ids=lambda one: one.kind)
