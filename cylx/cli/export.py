@@ -17,6 +17,7 @@ from cylx.cli.terminal.failures import answer, tell
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import InputError
 from cylx.io.outputs import write_together
+from cylx.wording import counted
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,12 +31,15 @@ if TYPE_CHECKING:
     examples=[
         "cylx export room.cylinders.json room.csv room.obj",
         "cylx export room.cylinders.json room.step --units m --min-confidence 0.9",
+        "cylx export plant.runs.json plant.ifc plant.pcf --units m",
     ],
 )
 @click.argument("result", shell_complete=complete_files)
 @click.argument("outputs", metavar="OUT...", nargs=-1, required=True, shell_complete=complete_files)
-@units_option(".glb, .step, .ifc and .dxf need")
-@click.option("--min-confidence", type=NumberRange(0, 1), metavar="X", help="Leave out less certain cylinders.")
+@units_option(".glb, .step, .ifc, .dxf and .pcf need")
+@click.option(
+    "--min-confidence", type=NumberRange(0, 1), metavar="X", help="Leave out less certain cylinders and fittings."
+)
 @overwrite_option
 @json_option
 @debug_option
@@ -51,7 +55,9 @@ def export(
     """Write the cylinders of RESULT for other programs.
 
     The suffix of each OUT selects the format: .ply, .obj, .glb and .stl are meshes, .csv is a table, .step and .stp are
-    exact solids, .ifc has pipe segments, and .dxf centre lines. All but the table need an extra, such as 'cylx[mesh]'.
+    exact solids, .ifc has pipe segments, .dxf centre lines, and .pcf piping components. If RESULT has fittings, as
+    those of 'cylx runs', they are written too, and cylinders end where a fitting begins; the table stays as it is. All
+    but .csv and .pcf need an extra, such as 'cylx[mesh]'.
     """
     from cylx.export import format_of, render
     from cylx.io import check_writable
@@ -74,6 +80,7 @@ def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[s
     return {
         "result": legible(result),
         "cylinders": len(drawing.cylinders),
+        **({} if drawing.piping is None else {"fittings": drawing.piping.fittings}),
         "flat": drawing.flat,
         "units": drawing.unit,
         "files": [
@@ -89,8 +96,11 @@ def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing
     from cylx.results import Result
 
     content = Result.parse(read_json(path), path)
-    chosen = content.cylinders if min_confidence is None else _sure(path, content.cylinders, min_confidence)
-    return drawing_of(chosen, units, path)
+    chosen, fittings = content.cylinders, content.fittings or []
+    if min_confidence is not None:
+        chosen = _sure(path, chosen, min_confidence)
+        fittings = [fitting for fitting in fittings if fitting.confidence >= min_confidence]
+    return drawing_of(chosen, units, path, fittings, content.runs or [])
 
 
 def _sure(path: str, cylinders: Sequence[ResultCylinder], least: float) -> list[ResultCylinder]:
@@ -102,7 +112,10 @@ def _sure(path: str, cylinders: Sequence[ResultCylinder], least: float) -> list[
 
 def _report(path: str, drawing: Drawing, written: dict[str, Exported]) -> None:
     """Report the files written, with remarks for their reader."""
-    count = len(drawing.cylinders)
-    tell(f"{path}: {count} cylinder{'' if count == 1 else 's'}, written to {', '.join(written)}")
+    said = counted(len(drawing.cylinders))
+    if drawing.piping is not None:
+        joined = drawing.piping.fittings
+        said += f" and {joined} fitting{'' if joined == 1 else 's'}"
+    tell(f"{path}: {said}, written to {', '.join(written)}")
     for remark in remarks_on(drawing, written):
         tell(f"warning: {remark}")

@@ -79,6 +79,7 @@ FORMATS = {
         Format(".stp", "step", "OCP", has_unit=True),
         Format(".ifc", "ifc", "ifcopenshell", has_unit=True, may_be_empty=True),
         Format(".dxf", "dxf", "ezdxf", has_unit=True, may_be_empty=True),
+        Format(".pcf", "pcf", has_unit=True, may_be_empty=True),
     )
 }
 

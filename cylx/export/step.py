@@ -1,4 +1,4 @@
-"""STEP: exact cylinders as solids, by Open CASCADE."""
+"""STEP: exact cylinders, and the tori and cones of fittings, as solids, by Open CASCADE."""
 
 from __future__ import annotations
 
@@ -6,15 +6,20 @@ import io
 import re
 from typing import Any
 
-from cylx.export.drawing import Drawing, Exported, Piece
+import numpy as np
+
+from cylx.export.drawing import Body, Drawing, Exported
 from cylx.export.formats import METRES
+from cylx.export.solids import Bend, Cone, Mitre, Solid
+from cylx.geometry.arrays import FloatArray
+from cylx.geometry.cylinder import Cylinder, axis_basis
 
 _NO_TIME = "1970-01-01T00:00:00"
 _STAMP = re.compile(rb"(FILE_NAME\('[^']*',')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d")
 
 
 def write(drawing: Drawing, suffix: str) -> Exported:
-    """Write a STEP file (AP214) with a named, coloured solid for each cylinder, in the unit of the scan.
+    """Write a STEP file (AP214) with a named, coloured solid for each cylinder and fitting, in the unit of the scan.
 
     Parameters
     ----------
@@ -36,7 +41,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     unit = drawing.unit or "m"
     document = TDocStd_Document(TCollection_ExtendedString("cylx"))
     XCAFDoc_DocumentTool.SetLengthUnit_s(document, METRES[unit])
-    labels = [_add(document, piece) for piece in drawing.pieces]
+    labels = [_add(document, body) for body in drawing.bodies]
     STEPControl_Controller.Init_s()  # the unit can only be set after this
     before = Interface_Static.CVal_s("write.step.unit")
     if not Interface_Static.SetCVal_s("write.step.unit", unit.upper()):
@@ -57,21 +62,83 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     return Exported(text)
 
 
-def _add(document: Any, piece: Piece) -> Any:  # noqa: ANN401  OCP has no types
-    """Add a cylinder to a document and return its label."""
-    from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder  # noqa: PLC0415  an extra
-    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt  # noqa: PLC0415  an extra
+def _add(document: Any, body: Body) -> Any:  # noqa: ANN401  OCP has no types
+    """Add a body to a document and return its label."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Fuse  # noqa: PLC0415  an extra
     from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor  # noqa: PLC0415  an extra
     from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415  an extra
     from OCP.TDataStd import TDataStd_Name  # noqa: PLC0415  an extra
     from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool  # noqa: PLC0415  an extra
 
-    shape = piece.shape
-    place = gp_Ax2(gp_Pnt(*shape.start.tolist()), gp_Dir(*shape.direction.tolist()))
-    solid = BRepPrimAPI_MakeCylinder(place, shape.radius, shape.height).Shape()
+    solid = _shape(body.solids[0])
+    for other in body.solids[1:]:
+        solid = BRepAlgoAPI_Fuse(solid, _shape(other)).Shape()
     label = XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).AddShape(solid, False)
-    TDataStd_Name.Set_s(label, TCollection_ExtendedString(piece.name))
-    color = Quantity_Color(*(part / 255 for part in piece.color), Quantity_TypeOfColor.Quantity_TOC_sRGB)
+    TDataStd_Name.Set_s(label, TCollection_ExtendedString(body.name))
+    color = Quantity_Color(*(part / 255 for part in body.color), Quantity_TypeOfColor.Quantity_TOC_sRGB)
     colors = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
     colors.SetColor(label, color, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
     return label
+
+
+def _shape(solid: Solid) -> Any:  # noqa: ANN401  OCP has no types
+    """Return a solid as a shape of Open CASCADE."""
+    from OCP.BRepPrimAPI import (  # noqa: PLC0415  an extra
+        BRepPrimAPI_MakeCone,
+        BRepPrimAPI_MakeCylinder,
+        BRepPrimAPI_MakeTorus,
+    )
+
+    if isinstance(solid, Cylinder):
+        return BRepPrimAPI_MakeCylinder(_place(solid.start, solid.direction), solid.radius, solid.height).Shape()
+    if isinstance(solid, Bend):
+        place = _place(solid.center, solid.normal, solid.radial)
+        return BRepPrimAPI_MakeTorus(place, solid.bend_radius, solid.radius, solid.angle).Shape()
+    if isinstance(solid, Mitre):
+        return _mitre(solid)
+    same = abs(solid.start_radius - solid.end_radius) < 1e-9 * solid.start_radius
+    if np.linalg.norm(solid.shift) > 1e-9 * solid.height or same:
+        return _loft(solid)
+    place = _place(solid.start, solid.axis)
+    return BRepPrimAPI_MakeCone(place, solid.start_radius, solid.end_radius, solid.height).Shape()
+
+
+def _place(point: FloatArray, direction: FloatArray, across: FloatArray | None = None) -> Any:  # noqa: ANN401
+    """Return a placement: a point, its z axis, and its x axis if that matters."""
+    from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt  # noqa: PLC0415  an extra
+
+    here, along = gp_Pnt(*point.tolist()), gp_Dir(*direction.tolist())
+    return gp_Ax2(here, along) if across is None else gp_Ax2(here, along, gp_Dir(*across.tolist()))
+
+
+def _loft(cone: Cone) -> Any:  # noqa: ANN401  OCP has no types
+    """Return the solid between two discs that do not face each other."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeWire  # noqa: PLC0415  an extra
+    from OCP.BRepOffsetAPI import BRepOffsetAPI_ThruSections  # noqa: PLC0415  an extra
+    from OCP.gp import gp_Circ  # noqa: PLC0415  an extra
+
+    loft, (across, _) = BRepOffsetAPI_ThruSections(True, True), axis_basis(cone.axis)
+    for center, radius in ((cone.start, cone.start_radius), (cone.end, cone.end_radius)):
+        edge = BRepBuilderAPI_MakeEdge(gp_Circ(_place(center, cone.axis, across), radius)).Edge()
+        loft.AddWire(BRepBuilderAPI_MakeWire(edge).Wire())
+    return loft.Shape()
+
+
+def _mitre(mitre: Mitre) -> Any:  # noqa: ANN401  OCP has no types
+    """Return two rods, cut by the plane between them."""
+    from OCP.BRepAlgoAPI import BRepAlgoAPI_Cut, BRepAlgoAPI_Fuse  # noqa: PLC0415  an extra
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeFace  # noqa: PLC0415  an extra
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakeCylinder, BRepPrimAPI_MakeHalfSpace  # noqa: PLC0415  an extra
+    from OCP.gp import gp_Dir, gp_Pln, gp_Pnt  # noqa: PLC0415  an extra
+
+    halves, cut = [], mitre.cut
+    plane = BRepBuilderAPI_MakeFace(gp_Pln(gp_Pnt(*mitre.corner.tolist()), gp_Dir(*cut.tolist()))).Face()
+    for begin, sign in ((mitre.start, 1.0), (mitre.end, -1.0)):
+        away = mitre.corner - begin
+        length = float(np.linalg.norm(away))
+        along = away / length
+        beyond = mitre.radius * float(np.linalg.norm(along - (along @ cut) * cut)) / abs(float(along @ cut))
+        rod = BRepPrimAPI_MakeCylinder(_place(begin, along), mitre.radius, length + 1.1 * beyond).Shape()
+        side = gp_Pnt(*(mitre.corner + sign * mitre.radius * cut).tolist())
+        halves.append(BRepAlgoAPI_Cut(rod, BRepPrimAPI_MakeHalfSpace(plane, side).Solid()).Shape())
+    return BRepAlgoAPI_Fuse(*halves).Shape()

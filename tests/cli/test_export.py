@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.pcf import read_pcf
+
 GOLDEN = Path(__file__).resolve().parents[2] / "sample_data" / "golden"
 PIPES = GOLDEN / "pipes.cylinders.json"
 
@@ -75,12 +77,49 @@ def test_what_is_taken_off_and_what_is_left_out_is_said(run_cylx, tmp_path, resu
     )
 
 
+@pytest.fixture
+def joined(tmp_path, result):
+    """A file with a result that has two fittings."""
+    evidence = {"inliers": 9, "rms": 0.0, "coverage": 0.5, "std": {}}
+    for number, one in enumerate(result["cylinders"][:2]):
+        cap = {"id": number, "kind": "cap", "joins": [one["id"]], "ends": ["end"], "confidence": 0.9 - 0.5 * number}
+        place = {"center": one["end"], "axis": one["axis_direction"], "radius": one["radius"]}
+        result.setdefault("fittings", []).append({**cap, **place, **evidence})
+    result["runs"] = []
+    (tmp_path / "r.json").write_text(json.dumps(result), encoding="utf-8")
+    return tmp_path / "r.json"
+
+
+@pytest.mark.parametrize(
+    ("options", "said", "caps"),
+    [
+        ([], "6 cylinders and 2 fittings", ["cap 0", "cap 1"]),
+        (["--min-confidence", "0.6"], "6 cylinders and 1 fitting", ["cap 0"]),
+        (["--min-confidence", "0.95"], "6 cylinders", []),
+    ],
+)
+def test_fittings_are_written_too(run_cylx, tmp_path, joined, options, said, caps):
+    done = run_cylx("export", joined, tmp_path / "a.pcf", tmp_path / "a.csv", "--units", "m", *options)
+    assert (done.exit_code, done.stdout) == (0, "")
+    assert f": {said}, written to " in done.stderr
+    _, pipelines = read_pcf((tmp_path / "a.pcf").read_bytes())
+    parts = [part for components in pipelines.values() for part in components]
+    assert [part.values["COMPONENT-ATTRIBUTE1"] for part in parts if part.kind == "CAP"] == caps
+    assert sum(part.kind == "PIPE" for part in parts) == int(said[0])
+
+
+def test_programs_are_told_the_number_of_fittings(run_cylx, tmp_path, joined):
+    done = run_cylx("export", joined, tmp_path / "a.pcf", "--units", "m", "--json")
+    assert {"cylinders": 6, "fittings": 2}.items() <= json.loads(done.stdout).items()
+
+
 @pytest.mark.parametrize(
     ("name", "options", "code", "said"),
     [
         ("a.dwg", [], 2, "a.dwg: .dwg is not a known format; use one of .ply, .obj, .glb, .stl, .csv, .step, "),
         ("a", [], 2, "a: has no suffix that names a format; use one of .ply"),
         ("a.dxf", [], 2, "a.dxf: .dxf has a unit of length; give that of the scan by --units: m, mm, cm, in, ft"),
+        ("a.pcf", [], 2, "a.pcf: .pcf has a unit of length; give that of the scan by --units"),
         ("a.glb", [], 2, "a.glb: .glb has a unit of length; give that of the scan by --units"),
         ("a.dxf", ["--units", "km"], 2, "Invalid value for '--units'"),
         ("none/a.csv", [], 4, "a.csv: the folder"),

@@ -360,7 +360,7 @@ def test_an_axis_needs_a_direction():
 @pytest.mark.parametrize(("suffix", "known"), FORMATS.items())
 def test_a_missing_library_is_named_with_its_extra(suffix, known, monkeypatch):
     if known.library is None:
-        known.demand("a.csv", None)
+        known.demand("a.csv", "m" if known.has_unit else None)
         return
     monkeypatch.setitem(sys.modules, known.library, None)
     remedy = re.escape(f"needs {known.library}, which is not installed; pip install 'cylx[{known.extra}]'")

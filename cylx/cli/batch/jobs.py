@@ -186,7 +186,7 @@ def mesh_bytes(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
         return None, []
     from cylx.cli.batch.meshes import mesh_of
 
-    return mesh_of(job.mesh, content.cylinders, job.units)
+    return mesh_of(job.mesh, content, job.units)
 
 
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> Written:
@@ -236,7 +236,7 @@ def _writers(
     def mesh(path: str | Path) -> None:
         from cylx.cli.batch.meshes import mesh_of
 
-        data, said = mesh_of(str(job.mesh), content.cylinders, job.units)
+        data, said = mesh_of(str(job.mesh), content, job.units)
         remarks.extend(said)
         write_bytes(path, data or b"", overwrite=overwrite)
 

@@ -9,7 +9,8 @@ from cylx.errors import UsageError
 
 if TYPE_CHECKING:
     from cylx.export import Drawing, Exported
-    from cylx.results import ResultCylinder
+    from cylx.results import Result, ResultCylinder
+    from cylx.results.fittings import AnyFitting, ResultRun
 
 
 def check_meshes(names: Sequence[str], units: str | None) -> None:
@@ -41,14 +42,14 @@ def check_meshes(names: Sequence[str], units: str | None) -> None:
         known.demand(name, units)
 
 
-def mesh_of(name: str, cylinders: Sequence[ResultCylinder], units: str | None) -> tuple[bytes | None, list[str]]:
-    """Make the mesh of the cylinders of a result.
+def mesh_of(name: str, content: Result, units: str | None) -> tuple[bytes | None, list[str]]:
+    """Make the mesh of the cylinders of a result, and of their fittings.
 
     Parameters
     ----------
     name : str
         File name; its suffix selects the format.
-    cylinders : sequence of ResultCylinder
+    content : Result
     units : str or None
         Unit of the scan.
 
@@ -61,22 +62,28 @@ def mesh_of(name: str, cylinders: Sequence[ResultCylinder], units: str | None) -
     """
     from cylx.export import format_of, render
 
-    if not cylinders:
+    if not content.cylinders:
         return None, [f"{name}: not written, as there are no cylinders"]
-    drawing = drawing_of(cylinders, units, name)
+    drawing = drawing_of(content.cylinders, units, name, content.fittings or (), content.runs or ())
     exported = render(drawing, format_of(name), name)
     return exported.data, remarks_on(drawing, {name: exported})
 
 
-def drawing_of(cylinders: Sequence[ResultCylinder], units: str | None, place: str) -> Drawing:
-    """Return a drawing of the cylinders of a result, in their colours in the annotated cloud."""
+def drawing_of(
+    cylinders: Sequence[ResultCylinder],
+    units: str | None,
+    place: str,
+    fittings: Sequence[AnyFitting] = (),
+    runs: Sequence[ResultRun] = (),
+) -> Drawing:
+    """Return a drawing of the cylinders of a result, in their colours in the annotated cloud, and of their fittings."""
     import numpy as np
 
     from cylx.export import draw
     from cylx.palette import cylinder_colors
 
     ids = np.array([cylinder.id for cylinder in cylinders], dtype=np.int64)
-    return draw(cylinders, cylinder_colors(ids), unit=units, place=place)
+    return draw(cylinders, cylinder_colors(ids), unit=units, place=place, fittings=fittings, runs=runs)
 
 
 def remarks_on(drawing: Drawing, written: dict[str, Exported]) -> list[str]:

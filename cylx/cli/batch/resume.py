@@ -122,7 +122,7 @@ def _belong(job: Job, result: Result) -> bool:
             return False
     if job.mesh is None:
         return True
-    mesh, _ = mesh_of(job.mesh, result.cylinders, job.units)
+    mesh, _ = mesh_of(job.mesh, result, job.units)
     file = Path(job.mesh)
     return (file.read_bytes() if file.is_file() else None) == mesh
 
