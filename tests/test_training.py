@@ -610,7 +610,7 @@ def test_the_evidence_is_itself_again_after_an_ablation():
 def synthetic_line(rng, index):
     """Make a line with every measure there is, of which the agreement decides."""
     names = "inside outside tangent tangent_both flank slope slope_error bulge bulge_error bend noise_ratio".split()  # noqa: SIM905  a list would be long
-    names += "structure structure_radii form_radii ovality explained facets".split()  # noqa: SIM905
+    names += "structure structure_radii form_radii ovality explained facets prism".split()  # noqa: SIM905
     measures = {name: float(0.1 * rng.random()) for name in names}
     true = bool(rng.random() < 0.4)
     measures |= {"height_radii": float(5 * rng.random()), "agreement": float(0.4 * true + 0.5 * rng.random())}

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 @click.command(
     cls=ExampleCommand,
     examples=[
-        "cylx export room.cylinders.json room.csv room.obj",
-        "cylx export room.cylinders.json room.step --units m --min-confidence 0.9",
+        "cylx export room.cylinders.json room.csv room.step --units m --min-confidence 0.9",
         "cylx export plant.runs.json plant.ifc plant.pcf --units m",
     ],
 )

@@ -18,7 +18,7 @@ CONCENTRIC = 0.85
 """A candidate on the same axis outside this ratio of radii belongs to another surface."""
 LIKE_RADIUS = 0.4
 """A candidate outside this ratio of radii belongs to another object, or to a detail: a rim, a dent, an edge."""
-LARGEST, ENOUGH_WINDOWS, SCALES = 0.9, 8, 8
+LARGEST, ENOUGH_WINDOWS, SCALES = 0.9, 20, 8
 """A window of this size in radii always tells; a scale must have so many windows to be looked at by itself; and windows
 are sorted into so many scales, each twice as large, the first being the smallest that can tell."""
 BLUR, SHARP = 2.0, 0.08

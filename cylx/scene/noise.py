@@ -51,6 +51,11 @@ WIDE_FOR_ITS_PLACE = 8.0
 thicker may be no surface."""
 
 
+LEAST_PARTLY = 0.1
+"""Noise in spacings that leaves only some of the smallest neighbourhoods wide; with less, as with the steps of a depth
+camera, others are not wide for another reason."""
+
+
 class Patches(NamedTuple):
     """Small pieces of surface.
 
@@ -163,7 +168,8 @@ def _finer(
     if noise > LEAST_NOISE * typical:
         fine, share = _noise_of_fine(points, cells, starts, side, sample, LEAST_NOISE * typical, threads)
         limit = float(np.interp(share, [PARTLY, MOSTLY], [MUCH_FINER, FINER]))
-        noise = fine if fine < limit * noise else noise
+        told = share >= MOSTLY or fine > LEAST_PARTLY * typical
+        noise = fine if told and fine < limit * noise else noise
     if noise > THICK_NOISE * typical:
         spreads = spreads_of_rods(points, cells, starts, side, sample[::4], threads)
         rods = finest_mode(spreads, LEAST_NOISE * typical) if len(spreads) else noise

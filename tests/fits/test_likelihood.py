@@ -107,9 +107,10 @@ def test_turned_moved_and_scaled_alike(seed, scale):
     mixing = np.array(axis_basis(other.model[3:6])) @ frame.T
     whole = np.zeros((5, 5))
     whole[:2, :2], whole[2:4, 2:4], whole[4, 4] = mixing, mixing, 1.0
-    assert other.covariance == pytest.approx(
-        whole @ plain.covariance @ whole.T * np.outer(units, units), rel=1e-3, abs=1e-9 * scale**2
-    )
+    # small covariances of large variances are the rounding of these
+    turned = whole @ plain.covariance @ whole.T * np.outer(units, units)
+    deviations = np.sqrt(np.diag(turned))
+    assert np.abs((other.covariance - turned) / np.outer(deviations, deviations)).max() < 1e-3
 
 
 def test_a_neighbour_on_one_side_does_not_pull():
