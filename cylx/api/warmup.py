@@ -10,7 +10,7 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -84,12 +84,20 @@ def warm_up(observer: Observer) -> Warmed:
     saved, cold = kernels_are_kept(), kernels_are_cold()
     with StageLog(observer).stage("compiling"), second_process() if saved and cold else nullcontext():
         extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
-    after = kept_files()
+    after, here = kept_files(), all_times_compiled() - compiled
     # the second process has compiled some, which this one has only read
     new = sum(before.get(path) != written for path, written in after.items())
-    count = new if saved else all_times_compiled() - compiled
-    folder = os.path.commonpath([str(path.parent) for path in after]) if saved and after else None
+    count = new if saved and here else here
+    folder = _common_folder(after) if saved else None
     return Warmed(count, len(after), folder, time.perf_counter() - began)
+
+
+def _common_folder(files: Iterable[Path]) -> str | None:
+    """Name the folder that all files are in or below."""
+    try:
+        return os.path.commonpath([path.parent for path in files])
+    except ValueError:  # there are none, or they are on several drives
+        return kernel_folder()
 
 
 def ask_between_kernels(call: Callable[[], None]) -> None:
