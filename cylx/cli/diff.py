@@ -26,8 +26,7 @@ _TOLERANCE = NumberRange(min=0)
     cls=ExampleCommand,
     examples=[
         "cylx diff golden/room.cylinders.json room.cylinders.json",
-        "cylx diff before.json after.json --radius 0.001 --json",
-        "cylx diff golden/room.cylinders.json room.cylinders.json --junit diff.xml",
+        "cylx diff before.json after.json --radius 0.001 --junit diff.xml",
     ],
 )
 @click.argument("a", shell_complete=complete_files)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from cylx.api.warmup import Warmed
 
 
-@click.command(cls=ExampleCommand, examples=["cylx warmup", "NUMBA_CACHE_DIR=/opt/kernels cylx warmup --quiet"])
+@click.command(cls=ExampleCommand, examples=["cylx warmup", "cylx warmup --quiet"])
 @click.option("-q", "--quiet", is_flag=True, help="Show errors only.")
 @debug_option
 def warmup(*, quiet: bool) -> None:
