@@ -3,6 +3,7 @@
 import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from cylx.api import warmup
 from cylx.geometry import kernels
 from cylx.records import SilentObserver
 from tests.support.patience import PATIENCE
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_end_of_the_method_is_practised_whole(monkeypatch):
@@ -59,6 +62,30 @@ def test_without_another_process_it_goes_on(monkeypatch):
     monkeypatch.setattr(sys, "executable", "/opt/blender/blender")
     with warmup.second_process():
         pass
+
+
+def test_a_scan_calls_no_practised_kernel_with_arguments_of_another_kind():
+    """An array of another layout would be another kernel, compiled when the first scan comes."""
+    code = """
+import cylx.synthetic
+from cylx.api.warmup import warm_up
+from cylx.geometry.kernels import _kernels
+from cylx.records import SilentObserver
+
+def called():
+    return {(one.py_func.__module__, one.py_func.__name__, str(kind)) for one in _kernels for kind in one.overloads}
+
+warm_up(SilentObserver())
+before = called()
+for cloud in (cylx.read_cloud("sample_data/pipes.ply"), cylx.synthetic.single(points=60000, seed=1).points):
+    cylx.extract(cloud)
+practised = {kind[:2] for kind in before}  # others are called by these alone, and kept with them
+print(sorted(kind for kind in called() - before if kind[:2] in practised))
+"""
+    process = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=False, timeout=PATIENCE, text=True, cwd=ROOT
+    )
+    assert (process.returncode, process.stdout) == (0, "[]\n"), process.stderr
 
 
 @pytest.fixture
