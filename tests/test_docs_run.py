@@ -16,11 +16,13 @@ import sys
 import tempfile
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 
 import pytest
 import yaml
 
 from cylx.pipeline import extract_cylinders
+from cylx.version import __version__ as cylx_version
 from tests.support import warm
 from tests.support.patience import PATIENCE
 from tests.support.texts import same
@@ -170,9 +172,9 @@ def test_the_code_blocks_run_and_give_what_is_shown(path, bash, clone, monkeypat
     assert [found for _, found in stale] == [block.text for block, _ in stale], "pytest tests/test_docs_run.py --regen"
 
 
-def only_block(language, word):
-    """Give the text of the block of a language, on the page about the command line, that has a word in it."""
-    page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
+def only_block(language, word, page="command-line.md"):
+    """Give the text of the block of a language, on a page, that has a word in it."""
+    page = (ROOT / "docs" / page).read_text(encoding="utf-8")
     (text,) = (block.text for block in blocks_of(page) if block.language == language and word in block.text)
     return text
 
@@ -203,3 +205,25 @@ def test_the_workflow_fails_when_a_cylinder_has_moved(bash, clone):
     golden.write_text(golden.read_text().replace('"radius": 0.15', '"radius": 0.16', 1), encoding="utf-8")
     with pytest.raises(AssertionError, match="radius"):
         bash(steps[-1])
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not here")
+def test_the_workflow_with_a_cache_names_its_key_and_writes_the_tests(bash, clone):
+    (job,) = yaml.safe_load(only_block("yaml", "runs-on", "howto-ci.md"))["jobs"].values()
+    (kept,) = (step["with"] for step in job["steps"] if step.get("uses", "").startswith("actions/cache@"))
+    assert kept["path"] == job["env"]["NUMBA_CACHE_DIR"]
+    for step in job["steps"]:
+        if "run" in step:
+            bash(f"export GITHUB_OUTPUT=outputs\n{step['run']}")
+    (line,) = (clone / "outputs").read_text(encoding="utf-8").splitlines()
+    assert re.fullmatch(rf"key=kernels-{re.escape(cylx_version)}(-[\w.]+)+", line)
+    suites = ElementTree.parse(clone / "diff.xml").getroot()
+    assert (suites.get("tests"), suites.get("failures")) == ("6", "0")
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not here")
+def test_the_job_of_another_server_writes_the_report_that_it_takes(bash, clone):
+    (job,) = yaml.safe_load(only_block("yaml", "artifacts", "howto-ci.md")).values()
+    for line in job["script"]:
+        bash(line)
+    assert (clone / job["artifacts"]["reports"]["junit"]).is_file()

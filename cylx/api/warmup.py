@@ -6,10 +6,13 @@ the method from its beginning on, another one practises its end; what that has f
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +20,15 @@ import numpy as np
 from cylx.config import Config
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS
-from cylx.geometry.kernels import at_each_kernel, damaged_files, folder_of, is_kept, times_compiled
+from cylx.geometry.kernels import (
+    all_times_compiled,
+    at_each_kernel,
+    damaged_files,
+    folder_of,
+    is_kept,
+    kept_files,
+    times_compiled,
+)
 from cylx.geometry.morton import find_cell, morton_codes
 from cylx.pipeline import extract_cylinders
 from cylx.pipeline.assembly import assemble
@@ -38,6 +49,55 @@ def compile_kernels(observer: Observer) -> None:
     if kernels_are_cold():
         with StageLog(observer).stage("compiling"), second_process() if kernels_are_kept() else nullcontext():
             extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
+
+
+@dataclass(frozen=True, slots=True)
+class Warmed:
+    """What compiling ahead has done.
+
+    Parameters
+    ----------
+    compiled : int
+        Number of kernels that were compiled now.
+    kept : int
+        Number of kernels that are kept for later runs.
+    folder : str or None
+        The folder, or the one above several, where they are kept; None if nothing can be saved.
+    seconds : float
+    """
+
+    compiled: int
+    kept: int
+    folder: str | None
+    seconds: float
+
+
+def warm_up(observer: Observer) -> Warmed:
+    """Compile all kernels that are not kept yet, also where only some are missing, by practising the whole method.
+
+    Parameters
+    ----------
+    observer : Observer
+        Receives the stage `compiling`.
+    """
+    began, before, compiled = time.perf_counter(), kept_files(), all_times_compiled()
+    saved, cold = kernels_are_kept(), kernels_are_cold()
+    with StageLog(observer).stage("compiling"), second_process() if saved and cold else nullcontext():
+        extract_cylinders(PointCloud(practice_cloud()), Config(), threads=1)
+    after, here = kept_files(), all_times_compiled() - compiled
+    # the second process has compiled some, which this one has only read
+    new = sum(before.get(path) != written for path, written in after.items())
+    count = new if saved and here else here
+    folder = _common_folder(after) if saved else None
+    return Warmed(count, len(after), folder, time.perf_counter() - began)
+
+
+def _common_folder(files: Iterable[Path]) -> str | None:
+    """Name the folder that all files are in or below."""
+    try:
+        return os.path.commonpath([path.parent for path in files])
+    except ValueError:  # there are none, or they are on several drives
+        return kernel_folder()
 
 
 def ask_between_kernels(call: Callable[[], None]) -> None:

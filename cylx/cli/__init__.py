@@ -25,6 +25,7 @@ from cylx.version import __version__
         "diff": "cylx.cli.diff",
         "export": "cylx.cli.export",
         "doctor": "cylx.cli.doctor",
+        "warmup": "cylx.cli.warmup",
         "reproduce": "cylx.cli.reproduce",
     },
     examples=["cylx extract scan.ply", "cylx extract scan.ply -o - | jq '.cylinders | length'"],

@@ -9,6 +9,7 @@ written to, the kernels are compiled in each run.
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
 import pickle
@@ -38,6 +39,9 @@ _checkpoints: list[Callable[[], None]] = []
 _known: list[_Files] = []
 """The files of all kernels."""
 
+_kernels: list[Any] = []
+"""All kernels, as dispatchers of Numba."""
+
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
@@ -60,6 +64,7 @@ def njit(**options: Any) -> Callable[[Kernel], Kernel]:  # noqa: ANN401  Numba h
             raise RuntimeError("Numba was imported with NUMBA_DISABLE_JIT set, and cylx needs it to compile: unset it")
         with contextlib.suppress(RuntimeError):  # no source file: nothing is kept
             dispatcher._cache = KernelCache(function, options)
+        _kernels.append(dispatcher)
         return dispatcher
 
     return compiled
@@ -89,6 +94,21 @@ def is_kept(kernel: Any) -> bool:  # noqa: ANN401  a dispatcher of Numba
 def times_compiled(kernel: Any) -> int:  # noqa: ANN401  a dispatcher of Numba
     """Return how often a kernel has been compiled in this process."""
     return sum(kernel.stats.cache_misses.values())
+
+
+def all_times_compiled() -> int:
+    """Return how many kernels have been compiled in this process; one for two kinds of arguments counts twice."""
+    return sum(map(times_compiled, _kernels))
+
+
+def kept_files() -> dict[Path, int]:
+    """Return the files of all kernels imported so far, and when each was written, nanoseconds."""
+    found: dict[Path, int] = {}
+    for files in _known:
+        for path in files.all():
+            with contextlib.suppress(OSError):  # another process may replace it
+                found[path] = path.stat().st_mtime_ns
+    return found
 
 
 _LOCATORS: list[Any] = CompileResultCacheImpl._locator_classes
@@ -218,12 +238,26 @@ def _body(path: Path) -> bytes | None:
 
 def _stamp(function: Callable[..., Any], options: dict[str, Any], cache: KernelCache) -> bytes:
     """Compute the digest of the source file, of the options, and of the kernels and constants from other files."""
-    digest = hashlib.sha256(
-        repr((numba.__version__, _sorted(options), cache._impl.locator.get_source_stamp())).encode()
-    )
+    digest = hashlib.sha256(repr((numba.__version__, _sorted(options), _source_stamp(function, cache))).encode())
     for name, value in sorted(_used(function)):
         digest.update(f"{name}={value}\n".encode())
     return digest.digest()
+
+
+def _source_stamp(function: Callable[..., Any], cache: KernelCache) -> object:
+    """Return a digest of the source file; its time, which Numba takes, changes when an image or a cache is unpacked."""
+    name = function.__code__.co_filename
+    try:
+        status = Path(name).stat()
+        return _digest_of(name, status.st_mtime_ns, status.st_size)
+    except OSError:  # inside an archive
+        return cache._impl.locator.get_source_stamp()
+
+
+@functools.lru_cache(maxsize=256)
+def _digest_of(name: str, _written: int, _size: int) -> str:
+    """Return the digest of a file, once for all its kernels."""
+    return hashlib.sha256(Path(name).read_bytes()).hexdigest()
 
 
 def _used(function: Callable[..., Any]) -> Iterator[tuple[str, str]]:

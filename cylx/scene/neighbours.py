@@ -71,6 +71,7 @@ def nearest_points(
     threads: int,
 ) -> tuple[IndexArray, FloatArray]:
     """Return the `size` nearest neighbours of each sample point, itself among them, and the distance of the last."""
+    sample = np.ascontiguousarray(sample)  # or the kernel would be compiled for each layout
     near, radius = np.empty((len(sample), size + 1), np.int64), np.empty(len(sample))
 
     def work(part: slice) -> None:

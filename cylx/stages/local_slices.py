@@ -98,6 +98,7 @@ def _look(
     threads: int,
 ) -> tuple[FloatArray, IndexArray]:
     """Search the windows about all seeds, in chunks over threads; the random draws of a window depend on its place."""
+    seeds = np.ascontiguousarray(seeds)  # or the kernel would be compiled for each layout
     rows = np.zeros((len(seeds), 9))
     chunks = np.array_split(np.arange(len(seeds)), max(1, min(8 * threads, len(seeds) // 16)))
     noises = frame.noise.about(scale.points[seeds], 2.0 * scale.radius)

@@ -64,7 +64,7 @@ def find_curved_patches(
     noise = frame.noise.least
     peeled = noise <= PEELED
     which = np.flatnonzero(explained.flatness <= (2.01 * frame.window if peeled else 0.0))
-    which = which[:: 1 + len(which) // MOST_PATCHES]
+    which = np.ascontiguousarray(which[:: 1 + len(which) // MOST_PATCHES])  # one layout: one compiled kernel
     if noise > MOST_NOISE or len(which) < SIZE:
         return Candidates.joined([]), None, StageReport("patches", 0, 0, {})
     normals = np.zeros((len(frame.points), 3), np.float32)
@@ -98,7 +98,7 @@ def find_curved_patches(
     own[~sharp] = 0.0
     normals[rest] = own
     seeds = np.unique(owners[sharp])
-    seeds = seeds[:: 1 + len(seeds) // MOST_SEEDS]
+    seeds = np.ascontiguousarray(seeds[:: 1 + len(seeds) // MOST_SEEDS])
     kept_patches = patches[seeds]
     cells, starts = own_cells, own_starts
     seen = normals[rest]

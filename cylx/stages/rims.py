@@ -119,7 +119,7 @@ def _normals_of_planes(frame: Frame, flatness: FloatArray) -> FloatArray:
     level = max(0, round(math.log2(CELL_SIDE / frame.unit)))
     cells, starts = cell_starts(frame.codes, level)
     which = np.flatnonzero(flatness > 0.0)
-    which = which[:: 1 + len(which) // ENOUGH_NORMALS]
+    which = np.ascontiguousarray(which[:: 1 + len(which) // ENOUGH_NORMALS])  # one layout: one compiled kernel
     normals = np.zeros((len(which), 3))
     radii = np.minimum(flatness[which], WIDEST)
     _fill_normals(frame.points, cells, starts, frame.unit * 2.0**level, which, radii, normals)

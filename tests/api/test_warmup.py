@@ -1,12 +1,19 @@
 """The first run: two processes share the compiling, and neither is left behind or needed."""
 
+import importlib
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
+import pytest
 
 from cylx.api import warmup
+from cylx.geometry import kernels
+from cylx.records import SilentObserver
 from tests.support.patience import PATIENCE
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_the_end_of_the_method_is_practised_whole(monkeypatch):
@@ -55,3 +62,68 @@ def test_without_another_process_it_goes_on(monkeypatch):
     monkeypatch.setattr(sys, "executable", "/opt/blender/blender")
     with warmup.second_process():
         pass
+
+
+def test_a_scan_calls_no_practised_kernel_with_arguments_of_another_kind():
+    """An array of another layout would be another kernel, compiled when the first scan comes."""
+    code = """
+import cylx.synthetic
+from cylx.api.warmup import warm_up
+from cylx.geometry.kernels import _kernels
+from cylx.records import SilentObserver
+
+def called():
+    return {(one.py_func.__module__, one.py_func.__name__, str(kind)) for one in _kernels for kind in one.overloads}
+
+warm_up(SilentObserver())
+before = called()
+for cloud in (cylx.read_cloud("sample_data/pipes.ply"), cylx.synthetic.single(points=60000, seed=1).points):
+    cylx.extract(cloud)
+practised = {kind[:2] for kind in before}  # others are called by these alone, and kept with them
+print(sorted(kind for kind in called() - before if kind[:2] in practised))
+"""
+    process = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=False, timeout=PATIENCE, text=True, cwd=ROOT
+    )
+    assert (process.returncode, process.stdout) == (0, "[]\n"), process.stderr
+
+
+@pytest.fixture
+def practised(tmp_path, monkeypatch):
+    """Warm up one kernel in place of all, each time as a new process would; gives what was done."""
+    (tmp_path / "a_kernel.py").write_text(
+        "from cylx.geometry.kernels import njit\n\n@njit(cache=True)\ndef kernel(x):\n    return x + 1.0\n"
+    )
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", str(tmp_path / "kept"))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(warmup, "kernels_are_cold", lambda: False)
+
+    def run():
+        monkeypatch.setattr(kernels, "_known", [])
+        monkeypatch.setattr(kernels, "_kernels", [])
+        sys.modules.pop("a_kernel", None)
+        kernel = importlib.import_module("a_kernel").kernel
+        monkeypatch.setattr(warmup, "extract_cylinders", lambda *_, **__: kernel(1.0))
+        return warmup.warm_up(SilentObserver())
+
+    yield run
+    sys.modules.pop("a_kernel", None)
+
+
+def test_what_is_compiled_ahead_is_counted_and_not_compiled_again(practised, tmp_path):
+    first, second = practised(), practised()
+    (file,) = (tmp_path / "kept").rglob("*.nbc")
+    assert (first.compiled, first.kept, first.folder) == (1, 1, str(file.parent))
+    assert (second.compiled, second.kept, second.folder) == (0, 1, str(file.parent))
+    file.write_bytes(b"damaged")
+    assert (practised().compiled, practised().compiled) == (1, 0)
+
+
+def test_what_cannot_be_kept_is_counted_too(practised, monkeypatch):
+    def fail(*_):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(warmup, "kernels_are_kept", lambda: False)
+    monkeypatch.setattr("pathlib.Path.write_bytes", fail)
+    done = practised()
+    assert (done.compiled, done.kept, done.folder) == (1, 0, None)

@@ -15,9 +15,22 @@ from cylx.cli.terminal import failures
 from cylx.cli.terminal.group import LazyGroup
 from cylx.errors import BatchError, ConfigError, InputError, NothingFoundError, OutputError, UsageError
 
-COMMANDS = ["extract", "runs", "view", "info", "config", "synth", "evaluate", "diff", "export", "doctor", "reproduce"]
+COMMANDS = [
+    "extract",
+    "runs",
+    "view",
+    "info",
+    "config",
+    "synth",
+    "evaluate",
+    "diff",
+    "export",
+    "doctor",
+    "warmup",
+    "reproduce",
+]
 LEAVES = [
-    *(["extract"], ["info"], ["evaluate"], ["diff"], ["export"], ["doctor"]),
+    *(["extract"], ["info"], ["evaluate"], ["diff"], ["export"], ["doctor"], ["warmup"]),
     *(["config", name] for name in ("init", "show", "check", "schema")),
     *(["synth", name] for name in ("single", "multi")),
 ]

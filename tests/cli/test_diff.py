@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import fields
+from xml.etree import ElementTree
 
 import pytest
 
@@ -95,6 +96,51 @@ def test_a_fault_names_the_file_it_is_in(compare, tmp_path):
 def test_a_missing_file_is_no_difference(run_cylx, tmp_path):
     failed = run_cylx("diff", tmp_path / "a.json", tmp_path / "b.json")
     assert (failed.exit_code, failed.stderr) == (3, f"cylx: {tmp_path / 'a.json'}: no such file; check the path\n")
+
+
+@pytest.mark.parametrize(("radius", "code", "failures"), [(1, 0, "0"), (1.01, 1, "1")])
+def test_a_junit_file_is_written_and_changes_no_exit_code(compare, tmp_path, radius, code, failures):
+    plain = compare([cylinder(0)], [cylinder(0, radius=radius)])
+    done = compare([cylinder(0)], [cylinder(0, radius=radius)], "--junit", tmp_path / "diff.xml")
+    assert (done.exit_code, done.stdout, done.stderr) == (code, plain.stdout, "")
+    root = ElementTree.parse(tmp_path / "diff.xml").getroot()
+    assert (root.tag, root.get("tests"), root.get("failures")) == ("testsuites", "1", failures)
+    shown = compare([cylinder(0)], [cylinder(0, radius=radius)], "--junit", "-")
+    assert (shown.exit_code, shown.stdout.encode()) == (code, (tmp_path / "diff.xml").read_bytes())
+
+
+def test_a_junit_file_that_is_there_is_replaced_only_if_told_so(compare, tmp_path):
+    (tmp_path / "diff.xml").write_text("mine")
+    failed = compare([cylinder(0)], [cylinder(0)], "--junit", tmp_path / "diff.xml")
+    assert (failed.exit_code, failed.stdout) == (4, "")
+    assert "exists already; choose another name, or give --overwrite" in failed.stderr
+    assert (tmp_path / "diff.xml").read_text() == "mine"
+    assert compare([cylinder(0)], [cylinder(0)], "--junit", tmp_path / "diff.xml", "--overwrite").exit_code == 0
+    assert ElementTree.parse(tmp_path / "diff.xml").getroot().get("tests") == "1"
+
+
+@pytest.mark.parametrize(
+    ("name", "others", "change", "code", "fault"),
+    [
+        ("a.json", ["--overwrite"], {}, 2, "is an input as well as an output"),
+        ("-", ["--json"], {}, 2, "goes to standard output, and so does --json; give --junit a file"),
+        ("none/diff.xml", [], {}, 4, "does not exist; create it first"),
+        (".", [], {}, 4, "is a folder"),
+        ("diff.xml", [], {"radius": "x"}, 3, "is not a number"),
+        ("diff.xml", [], {"axis_direction": [0, 0, 0]}, 3, "b.json"),
+        ("diff.xml", [], {"id": "x"}, 3, "is not a whole number"),
+    ],
+)
+def test_what_is_wrong_with_a_junit_file_is_said_and_none_is_written(
+    compare, tmp_path, name, others, change, code, fault
+):
+    path = name if name == "-" else tmp_path / name
+    failed = compare([cylinder(0)], [cylinder(0, **change)], "--junit", path, *others)
+    assert (failed.exit_code, failed.stdout) == (code, "")
+    assert fault in failed.stderr
+    assert failed.stderr.count("\n") == 1
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["a.json", "b.json"]
+    assert json.loads((tmp_path / "a.json").read_text()) == {"cylinders": [cylinder(0)]}
 
 
 def test_the_tolerances_are_those_of_the_library():

@@ -105,6 +105,15 @@ def test_another_source_is_another_kernel(kernels, tmp_path, change):
     assert kernels().kernel(1.0) == 6.0
 
 
+def test_the_time_of_the_source_does_not_count(kernels, tmp_path):
+    """Images and caches are unpacked with other times, or with whole seconds."""
+    kernels().kernel(1.0)
+    os.utime(tmp_path / "some_kernels.py", (1e9, 1e9))
+    later = kernels()
+    assert later.kernel(1.0) == 2.0
+    assert later.times_compiled(later.kernel) == 0
+
+
 def test_a_folder_that_fails_costs_no_answer(kernels, tmp_path, monkeypatch):
     def fail(*_):
         raise OSError(28, "No space left on device")

@@ -33,7 +33,7 @@ MAY_IMPORT = {
     "evidence": {"geometry", "records"},
     "records": {"config", "fits", "geometry", "wording"},
     "synthetic": {"errors", "geometry"},
-    "evaluation": {"errors", "geometry"},
+    "evaluation": {"errors", "geometry", "harmless"},
     "config": {"errors"},
     "optional": {"errors"},
     "fits": {"geometry"},
