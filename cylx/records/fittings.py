@@ -23,7 +23,8 @@ class Fitting:
     ends : tuple of {'start', 'end', 'side'}
         Where it meets each of them.
     confidence : float
-        Probability that it is such a fitting, in [0, 1].
+        How well its points tell it, or the axes where it has no points, in [0, 1]: a score, not a probability that was
+        fitted to truths.
     inliers : int
         Points on its surface.
     rms : float

@@ -30,7 +30,7 @@ class ResultFitting(Part):
     ends: list[Literal["start", "end", "side"]]
     """Where it meets each of them: at one of the two ends, or on the surface between them."""
     confidence: Share
-    """Probability that it is such a fitting."""
+    """How well its points tell it, or the axes where it has no points: a score, not a probability fitted to truths."""
     inliers: Count
     """Points on its surface."""
     rms: Length

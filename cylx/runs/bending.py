@@ -301,9 +301,8 @@ def judged(
     beside = on_arc & (np.abs(errors) >= width) & (np.abs(errors) < max(BESIDE * radius, 2.0 * width))
     if count < LEAST_INLIERS or inside.sum() > MOST_INSIDE * count or beside.sum() > MOST_INSIDE * count:
         return None
-    length = bend.length + 2.0 * margin
-    pieces = int(np.clip(length / max(2.0 * near.spacing, 1e-12), 1, BINS))
-    rows = np.clip(((along + margin) / length * pieces).astype(np.int64), 0, pieces - 1)
+    pieces = int(np.clip((bend.length + 2.0 * margin) / max(2.0 * near.spacing, 1e-12), 1, BINS))
+    rows = np.clip(((along + margin) / (bend.length + 2.0 * margin) * pieces).astype(np.int64), 0, pieces - 1)
     on_it, off_it = (np.bincount(rows[which], minlength=pieces) for which in (own, inside | beside))
     # a bend that is two shows in pieces whose points are beside it
     good, filled = on_it > off_it, on_it + off_it > 0
@@ -312,15 +311,7 @@ def judged(
     rms = float(np.sqrt((errors[own] ** 2).mean()))
     if not one_bend or lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
         return None
-    rows = rows[own]
-    center = bend.meeting if bend.bend_radius == 0 else bend.center
-    points = near.points[indices[own]]
-    radial = points - center
-    # angle about the tube: from the outside of the bend
-    high = radial @ bend.normal
-    out = np.hypot(radial @ bend.first, radial @ bend.inward) - bend.bend_radius
-    sector = np.floor((np.arctan2(high, out) / (2 * math.pi) + 0.5) * 12).astype(np.int64) % 12
-    coverage = len(np.unique(rows * 12 + sector)) / (12.0 * pieces)
+    coverage = _covered(bend, near.points[indices[own]], rows[own]) / (12.0 * pieces)
     turn = solved.covariance[2:4, 2:4] + solved.covariance[6:8, 6:8]
     std = {
         "bend_radius": math.sqrt(max(solved.covariance[9, 9], 0.0)),
@@ -341,3 +332,13 @@ def judged(
         solved.change.reshape(2, 4),
         np.stack([solved.covariance[:4, :4], solved.covariance[4:8, 4:8]]),
     )
+
+
+def _covered(bend: Bend, points: FloatArray, rows: IndexArray) -> int:
+    """Return how many cells of the surface of a bend hold points: each of its pieces has twelve about the tube."""
+    radial = points - (bend.meeting if bend.bend_radius == 0 else bend.center)
+    # angle about the tube: from the outside of the bend
+    high = radial @ bend.normal
+    out = np.hypot(radial @ bend.first, radial @ bend.inward) - bend.bend_radius
+    sector = np.floor((np.arctan2(high, out) / (2 * math.pi) + 0.5) * 12).astype(np.int64) % 12
+    return len(np.unique(rows * 12 + sector))

@@ -21,7 +21,7 @@ from cylx import synthetic
 SIZES = {"small": 3, "middle": 8, "large": 20}  # runs of pipe; 50000 points a run
 KINDS = ("elbow", "tee", "cross", "reducer", "flange", "inline", "cap")
 BARS = {"elbow": 0.95, "tee": 0.92, "reducer": 0.9, "flange": 0.85}
-WITHOUT = ("elbow", "reducer", "flange", "inline", "tee", "cross", "joint")
+CONFIDENCES = (0.0, 0.8, 0.95, 1.0)
 
 
 def rates(matched, false, missed):
@@ -31,8 +31,8 @@ def rates(matched, false, missed):
 
 
 def plants(runs, seeds):
-    """Extract plants of one size; sum up what was matched, false and missed, and the times."""
-    counts, pairs, good = {}, Counter(), []
+    """Extract plants of one size; sum up what was matched, false and missed, the confidences, and the times."""
+    counts, pairs, good, sure = {}, Counter(), [], []
     seconds = np.zeros(2)
     for seed in seeds:
         scene = synthetic.piping(runs=runs, seed=seed)
@@ -48,17 +48,21 @@ def plants(runs, seeds):
         for kind, one in score.fittings.kinds.items():
             counts.setdefault(kind, np.zeros(3, int))
             counts[kind] += [one.matched, len(one.false), len(one.missed)]
+            found_ones = (fitting for fitting in result["fittings"] if fitting["kind"] == kind)
+            sure += [(fitting["confidence"], fitting["id"] not in one.false) for fitting in found_ones]
         elbows = score.fittings.kinds["elbow"].matched if "elbow" in score.fittings.kinds else 0
         good += [score.fittings.good_elbows] * elbows
         pairs.update(truth=score.runs.pairs_truth, found=score.runs.pairs_predicted, both=score.runs.pairs_matched)
-    return counts, pairs, good, seconds
+    return counts, pairs, good, sure, seconds
 
 
 def report_plants(sizes, seeds, bars, held):
-    """Print a table of rates, one row a kind and size."""
+    """Print a table of rates, one row a kind and size, and one of how far confidences can be believed."""
+    everywhere = []
     print_header("plant", "what", "there", "precision", "recall", "F1", "bar")
     for name in sizes:
-        counts, pairs, good, seconds = plants(SIZES[name], range(seeds))
+        counts, pairs, good, sure, seconds = plants(SIZES[name], range(seeds))
+        everywhere += sure
         for kind in ("straight", *KINDS):
             if kind not in counts:
                 continue
@@ -77,6 +81,14 @@ def report_plants(sizes, seeds, bars, held):
         said = bars.at_least(share, 0.9 if held else None)
         print_row(name, "elbows within 5 % and 1°", str(len(good)), share, None, None, said)
         print_row(name, "seconds: cylinders, runs", "", float(seconds[0]), float(seconds[1]), None, "")
+    print()
+    print_header("confidence of fittings", "there", "mean", "true or not asked for")
+    confidence, true = np.array(everywhere, dtype=float).reshape(-1, 2).T
+    for low, high in pairwise(CONFIDENCES):
+        chosen = (confidence >= low) & ((confidence < high) | (high == CONFIDENCES[-1]))
+        if chosen.any():
+            means = float(confidence[chosen].mean()), float(true[chosen].mean())
+            print_row(f"{low:g} to {high:g}", str(int(chosen.sum())), *means)
 
 
 def without(rooms):
@@ -91,8 +103,8 @@ def without(rooms):
 
 def report_without(rooms, bars, held):
     """Print what was found in clouds without pipes: those in which a fitting was."""
-    print_header("clouds", "cylinders", "fittings", "which")
-    sums, clouds, cylinders = {}, Counter(), Counter()
+    print_header("clouds", "cylinders", "caps", "other fittings", "which")
+    sums, clouds, cylinders, caps = {}, Counter(), Counter(), Counter()
     for name, points in without(rooms):
         kind = name.split()[0]
         try:
@@ -100,7 +112,8 @@ def report_without(rooms, bars, held):
         except cylx.CylxError as error:
             print(f"{name}: {error}", file=sys.stderr)
             continue
-        here = Counter(one.kind for one in found.piping.fittings if one.kind in WITHOUT)
+        here = Counter(one.kind for one in found.piping.fittings)
+        caps[kind] += here.pop("cap", 0)
         clouds[kind] += 1
         cylinders[kind] += len(found.cylinders)
         sums.setdefault(kind, Counter()).update(here)
@@ -110,7 +123,7 @@ def report_without(rooms, bars, held):
         total = sum(sums[kind].values())
         said = ", ".join(f"{n} {what}" for what, n in sorted(sums[kind].items())) or "none"
         held_to = bars.at_most(total, 0 if held else None)
-        print_row(f"{count} of {kind}", str(cylinders[kind]), str(total), f"{said} {held_to}".strip())
+        print_row(f"{count} of {kind}", str(cylinders[kind]), str(caps[kind]), str(total), f"{said} {held_to}".strip())
 
 
 def main():

@@ -71,7 +71,6 @@ class Run:
         OutputError
             If the JSON cannot be written; what went wrong with the other outputs is in what is returned.
         """
-        from cylx.cli.batch.found import report
         from cylx.cli.batch.tiled import TiledRun, check_tiles, extract_tiled, needs_tiles, why_tiles
 
         if needs_tiles(job.scan, self.tiles):
@@ -89,6 +88,11 @@ class Run:
                 self.resume,
             )
             return extract_tiled(how, [job, *self.others])
+        return self._extract_whole(job)
+
+    def _extract_whole(self, job: Job) -> Finished:
+        """Extract a scan that fits into memory, as `extract_one` does."""
+        from cylx.cli.batch.found import report
         from cylx.cli.terminal.display import Observers, observed
         from cylx.cli.terminal.startup import collect_rarely, import_numba_without_blas
 
