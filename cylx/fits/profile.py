@@ -1,43 +1,54 @@
 """The profile of a rounded edge: two lines and the arc that touches both, fitted as one.
 
 Near an end of the arc the line that it goes on into is within the noise of it. A circle fitted to what looks like the
-arc takes points of the lines, and comes out too large. The lines are seen over a length of their own and are known
-well, and so the arc has one unknown left: its radius if the lines meet, the place of its centre if they are parallel.
+arc takes points of the lines, and comes out too large. Here the circle and the directions of its two tangents are
+fitted at once to all points, each point to what is nearest: five unknowns, whatever the lines enclose, a slot's half
+turn included, and robustly, as other surfaces come near.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.kernels import njit
+from cylx.geometry.numerics import solve_in_place
 
-LEAST_ON_LINE = 12
-"""Points of a line."""
+LEAST_ON_LINE, LEAST_ON_ARC = 12, 12
+"""Points of a line and of the arc."""
 NEAR_LINE = 2.5
 """Points within so many deviations are on a line."""
 LINE_LENGTH = 2.0
-"""The lines are looked for so many radii long past where they touch the arc."""
+"""The lines count up to so many radii of the first circle past where they touch the arc."""
 CLEAR = 0.35
-"""A line is fitted to what is further than this, in radii, past where it touches the arc."""
-SIDE_STEPS = np.radians(np.arange(8.0, 116.0, 3.0))
-"""Half angles of the arc that are tried."""
-OFFSETS = np.array([-1.5, 0.0, 1.5])
-"""Distances of a line from the first circle that are tried, in deviations."""
-LEAST_TURN, PARALLEL = math.radians(20.0), math.radians(172.0)
-"""Turns between the lines that have an arc, and from which the lines are parallel."""
-RADII = np.geomspace(0.35, 1.5, 30)
-"""Radii that are tried, as shares of that of the first circle."""
+"""A line is known by what is further than this, in radii, past where it touches the arc."""
+OPENINGS = np.radians([45.0, 70.0, 100.0, 140.0, 180.0])
+"""Angles of the arc from which the fit sets out."""
+LEAST_TURN, MOST_TURN = math.radians(20.0), math.radians(300.0)
+"""Angles that an arc may have."""
+RADII = 0.3, 1.6
+"""Least and greatest radius, as shares of that of the first circle."""
+TUKEY = 4.685
+"""Residuals of so many deviations and more have no weight."""
+WIDER, NARROWED = 3.0, 0.7
+"""The first weights are wider by this factor, and each step's narrower than the last one's."""
+STEPS, SETTLED = 40, 1e-4
+"""Steps at most; a step of less than this, in radii, is the last."""
+LONGEST_STEP, WIDEST_TURN = 0.2, 0.15
+"""Longest step of the circle, in radii, and of the directions, radians."""
+ALIKE = 1.2
+"""Fits whose points scatter up to this factor more than those of the best one may be better, as they have more."""
+ENOUGH_TO_START = 600
+"""Points that suffice to choose where to set out from."""
 CLIPPED = 3.0
 """Residuals count up to so many deviations."""
-FINER = 3
-"""Fits of a line to the points about the last one."""
 ABOUT = 0.35
 """What lies within so many radii of the arc is compared with it."""
+CENTER_X, CENTER_Y, OWN, FIRST, LAST = range(5)
+"""The unknowns: centre, radius, and the directions of the two ends of the arc."""
 
 
 class Profile(NamedTuple):
@@ -52,8 +63,8 @@ class Profile(NamedTuple):
     opening : float
         Half the angle of the arc, radians.
     gain, edge_gain : float
-        How much smaller the sum of squared residuals is than that of the first circle with its lines, and than that
-        of the sharp edge of the lines, in squared deviations.
+        How much smaller the sum of squared residuals is than that of the first circle between the same directions, and
+        than that of the lines alone, which meet in an edge or go on, in squared deviations.
     chi_square : float
         Mean square of the residuals of what lies about the arc, in squared deviations, clipped.
     """
@@ -65,13 +76,6 @@ class Profile(NamedTuple):
     gain: float
     edge_gain: float
     chi_square: float
-
-
-class _Line(NamedTuple):
-    """A line: unit normal, away from the arc's centre, and distance from zero."""
-
-    normal: FloatArray
-    offset: float
 
 
 def fit_profile(points: FloatArray, radius: float, middle: float, deviation: float) -> Profile | None:
@@ -95,176 +99,209 @@ def fit_profile(points: FloatArray, radius: float, middle: float, deviation: flo
     """
     turn = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]])
     local = np.ascontiguousarray(points @ turn.T)  # the arc's middle is on the first axis
-    upper, lower = _line_beside(local, radius, deviation, 1.0), _line_beside(local, radius, deviation, -1.0)
-    if upper is None or lower is None:
+    some = np.ascontiguousarray(local[:: 1 + len(local) // ENOUGH_TO_START])
+    reach = LINE_LENGTH * radius
+    starts = []
+    for opening in OPENINGS:
+        started = np.array([0.0, 0.0, radius, -0.5 * opening, 0.5 * opening])
+        if _settle(some, started, radius, reach, deviation):
+            starts.append((*_explained(some, started, reach, deviation), started))
+    closest = min((scatter for _, scatter, _ in starts), default=0.0)
+    # a circle too large may pass by more points, and scatters more
+    alike = [(cost, started) for cost, scatter, started in starts if scatter <= ALIKE * closest]
+    best = min(alike, key=lambda one: one[0], default=(0.0, None))[1]
+    if best is None or not _settle(local, best, radius, reach, deviation):
         return None
-    turned = math.acos(min(1.0, max(-1.0, float(upper.normal @ lower.normal))))
-    if upper.normal[1] < lower.normal[1] or not turned > LEAST_TURN:
+    upper, lower, on_arc, about, squares, edge = _seen(local, best, reach, deviation)
+    if min(upper, lower) < LEAST_ON_LINE or min(on_arc, about) < LEAST_ON_ARC:
         return None
-    rotation = math.atan2(upper.normal[1] + lower.normal[1], upper.normal[0] + lower.normal[0])
-    if math.cos(rotation) < 0.0:  # the normals of a half turn nearly cancel each other
-        rotation, turned = rotation + math.pi, 2.0 * math.pi - turned
-    if turned > PARALLEL:
-        found = _slide(local, radius, upper, lower, deviation)
-    else:
-        found = _grow(local, radius, upper, lower, deviation)
-    if found is None:
-        return None
-    center, own, gain, edge_gain = found
-    away = local - center
-    distances = np.hypot(away[:, 0], away[:, 1])
-    inner = away @ np.array([math.cos(rotation), math.sin(rotation)]) > math.cos(0.5 * turned) * distances
-    residuals = (distances - own)[inner & (np.abs(distances - own) < ABOUT * own)]
-    if len(residuals) < LEAST_ON_LINE:
-        return None
-    chi_square = float((np.minimum(np.abs(residuals) / deviation, CLIPPED) ** 2).mean())
-    return Profile(center @ turn, own, middle + rotation, 0.5 * turned, gain, edge_gain, chi_square)
+    least, _ = _explained(local, best, reach, deviation)
+    first = np.array([0.0, 0.0, radius, best[FIRST], best[LAST]])
+    gain = _explained(local, first, reach, deviation)[0] - least
+    center = best[: CENTER_Y + 1] @ turn
+    rotation, opening = 0.5 * (best[FIRST] + best[LAST]), 0.5 * (best[LAST] - best[FIRST])
+    return Profile(center, float(best[OWN]), middle + float(rotation), float(opening), gain, edge, squares / about)
 
 
-def _line_beside(local: FloatArray, radius: float, deviation: float, sign: float) -> _Line | None:
-    """Return the line that touches the first circle on one side of its middle and has most points."""
-    x, y = np.ascontiguousarray(local[:, 0]), sign * local[:, 1]
-    place, offset = _most_on_line(x, y, np.cos(SIDE_STEPS), np.sin(SIDE_STEPS), OFFSETS * deviation, radius, deviation)
-    if place < 0:
-        return None
-    normal = np.array([math.cos(SIDE_STEPS[place]), math.sin(SIDE_STEPS[place])])
-    distance = radius + float(OFFSETS[offset]) * deviation
-    own = np.column_stack([x, y])
-    for _ in range(FINER):
-        along = own @ np.array([-normal[1], normal[0]])
-        on = (along > CLEAR * radius) & (along < LINE_LENGTH * radius)
-        on &= np.abs(own @ normal - distance) < NEAR_LINE * deviation
-        if on.sum() < LEAST_ON_LINE:
-            return None
-        center = own[on].mean(axis=0)
-        _, _, axes = np.linalg.svd(own[on] - center, full_matrices=False)
-        normal = axes[1] * math.copysign(1.0, float(axes[1] @ normal))
-        distance = float(center @ normal)
-    return _Line(np.array([normal[0], sign * normal[1]]), distance)
+def tilt_of(points: FloatArray, heights: FloatArray, profile: Profile, reach: float, deviation: float) -> FloatArray:
+    """Return how much the axis leans against the points of a profile, in its plane, per unit of height.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 2)
+    heights : ndarray of shape (n,)
+        Along the axis, from the middle.
+    profile : Profile
+    reach : float
+        Length of the lines that counts.
+    deviation : float
+        Standard deviation of the points about the profile.
+
+    Returns
+    -------
+    ndarray of shape (2,)
+        Zero if the points do not tell.
+    """
+    own = np.array(
+        [*profile.center, profile.radius, profile.middle - profile.opening, profile.middle + profile.opening]
+    )
+    matrix, right = np.zeros((2, 2)), np.zeros(2)
+    _lean(np.ascontiguousarray(points), heights, own, reach, deviation, matrix, right)
+    return right if solve_in_place(matrix, right) else np.zeros(2)
 
 
 @njit(cache=True, nogil=True)
-def _most_on_line(
-    x: FloatArray,
-    y: FloatArray,
-    cosines: FloatArray,
-    sines: FloatArray,
-    offsets: FloatArray,
-    radius: float,
-    deviation: float,
-) -> tuple[int, int]:
-    """Return which of the touching lines, of an angle and an offset, has most points; negative if none has enough."""
-    place, shift, most = -1, -1, LEAST_ON_LINE - 1
-    counts = np.empty(len(offsets), np.int64)
-    for a in range(len(cosines)):
-        for b in range(len(offsets)):
-            counts[b] = 0
-        for i in range(len(x)):
-            along = y[i] * cosines[a] - x[i] * sines[a]
-            if CLEAR * radius < along < LINE_LENGTH * radius:
-                height = x[i] * cosines[a] + y[i] * sines[a] - radius
-                for b in range(len(offsets)):
-                    if abs(height - offsets[b]) < NEAR_LINE * deviation:
-                        counts[b] += 1
-        for b in range(len(offsets)):
-            if counts[b] > most:
-                place, shift, most = a, b, counts[b]
-    return place, shift
+def _place(x: float, y: float, profile: FloatArray, normals: FloatArray) -> tuple[int, float, float]:
+    """Return what a point is nearest to, its residual, and how far it is past the end of the arc.
 
-
-def _cost(local: FloatArray, center: FloatArray, radius: float, lines: tuple[_Line, _Line], deviation: float) -> float:
-    """Return the sum of squared residuals about the profile, in squared deviations, clipped."""
-    (upper, upper_offset), (lower, lower_offset) = lines
-    return float(_sum_of_squares(local, center, radius, upper, upper_offset, lower, lower_offset, deviation))
+    What: 0 for the arc, 1 for the line at its last end, -1 for the one at its first.
+    """
+    x, y = x - profile[CENTER_X], y - profile[CENTER_Y]
+    middle = 0.5 * (profile[FIRST] + profile[LAST])
+    away = math.atan2(y, x) - middle
+    away -= 2.0 * math.pi * math.floor(away / (2.0 * math.pi) + 0.5)
+    if abs(away) <= 0.5 * (profile[LAST] - profile[FIRST]):
+        return 0, math.sqrt(x * x + y * y) - profile[OWN], 0.0
+    k = 2 if away > 0.0 else 0
+    along = y * normals[k] - x * normals[k + 1]
+    return (1 if k else -1), x * normals[k] + y * normals[k + 1] - profile[OWN], along if k else -along
 
 
 @njit(cache=True, nogil=True)
-def _sum_of_squares(
+def _fill_normals(profile: FloatArray, normals: FloatArray) -> None:
+    normals[0], normals[1] = math.cos(profile[FIRST]), math.sin(profile[FIRST])
+    normals[2], normals[3] = math.cos(profile[LAST]), math.sin(profile[LAST])
+
+
+@njit(cache=True, nogil=True)
+def _settle(local: FloatArray, profile: FloatArray, radius: float, reach: float, deviation: float) -> bool:
+    """Fit a profile in place, by Gauss-Newton steps with Tukey's weights; return whether it is one."""
+    matrix, right, row, normals = np.zeros((5, 5)), np.zeros(5), np.zeros(5), np.zeros(4)
+    for step in range(STEPS):
+        width = TUKEY * deviation * max(1.0, WIDER * NARROWED**step)
+        matrix[:], right[:] = 0.0, 0.0
+        _fill_normals(profile, normals)
+        for i in range(len(local)):
+            kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
+            if abs(residual) >= width or along < 0.0 or along > reach:
+                continue
+            row[OWN], row[FIRST], row[LAST] = -1.0, 0.0, 0.0
+            if kind == 0:
+                x, y = local[i, 0] - profile[CENTER_X], local[i, 1] - profile[CENTER_Y]
+                distance = max(residual + profile[OWN], 1e-12 * profile[OWN])
+                row[CENTER_X], row[CENTER_Y] = -x / distance, -y / distance
+            else:
+                k = 2 if kind > 0 else 0
+                row[CENTER_X], row[CENTER_Y] = -normals[k], -normals[k + 1]
+                row[LAST if kind > 0 else FIRST] = kind * along
+            weight = (1.0 - (residual / width) ** 2) ** 2
+            for a in range(5):
+                right[a] -= weight * row[a] * residual
+                for b in range(5):
+                    matrix[a, b] += weight * row[a] * row[b]
+        for a in range(5):
+            matrix[a, a] = matrix[a, a] * (1.0 + 1e-9) + 1e-12
+        if not solve_in_place(matrix, right):
+            return False
+        share = 1.0
+        for a in range(5):
+            most = LONGEST_STEP * profile[OWN] if a <= OWN else WIDEST_TURN
+            share = min(share, most / max(abs(right[a]), 1e-300))
+        for a in range(5):
+            profile[a] += share * right[a]
+        opened = profile[LAST] - profile[FIRST]
+        if not RADII[0] * radius < profile[OWN] < RADII[1] * radius or not LEAST_TURN < opened < MOST_TURN:
+            return False
+        moved = max(abs(right[CENTER_X]), abs(right[CENTER_Y]), abs(right[OWN]))
+        if moved < SETTLED * profile[OWN] and WIDER * NARROWED**step < 1.0:
+            break
+    return True
+
+
+@njit(cache=True, nogil=True)
+def _lean(
     local: FloatArray,
-    center: FloatArray,
-    radius: float,
-    upper: FloatArray,
-    upper_offset: float,
-    lower: FloatArray,
-    lower_offset: float,
+    heights: FloatArray,
+    profile: FloatArray,
+    reach: float,
     deviation: float,
-) -> float:
-    # along each line, away from the arc
-    turn = lower[1] * upper[0] - lower[0] * upper[1]
-    sign = -1.0 if turn > 1e-9 else 1.0
-    back = 1.0 if abs(turn) < 1e-9 else -sign
-    total = 0.0
+    matrix: FloatArray,
+    right: FloatArray,
+) -> None:
+    """Sum up the normal equations of the lean of the axis, with Tukey's weights."""
+    normals, width = np.zeros(4), TUKEY * deviation
+    _fill_normals(profile, normals)
     for i in range(len(local)):
-        x, y = local[i, 0] - center[0], local[i, 1] - center[1]
-        residual = abs(math.sqrt(x * x + y * y) - radius)
-        if sign * (y * upper[0] - x * upper[1]) > 0.0:
-            residual = min(residual, abs(local[i, 0] * upper[0] + local[i, 1] * upper[1] - upper_offset))
-        if back * (y * lower[0] - x * lower[1]) > 0.0:
-            residual = min(residual, abs(local[i, 0] * lower[0] + local[i, 1] * lower[1] - lower_offset))
-        ratio = min(residual / deviation, CLIPPED)
-        total += ratio * ratio
-    return total
-
-
-def _grow(
-    local: FloatArray, radius: float, upper: _Line, lower: _Line, deviation: float
-) -> tuple[FloatArray, float, float, float] | None:
-    """Find the radius of the arc that touches two lines that meet."""
-    matrix = np.array([upper.normal, lower.normal])
-
-    def center_of(own: float) -> FloatArray:
-        return np.linalg.solve(matrix, np.array([upper.offset - own, lower.offset - own]))
-
-    def cost(own: float) -> float:
-        return _cost(local, center_of(own), own, (upper, lower), deviation)
-
-    tried = np.array([cost(share * radius) for share in RADII])
-    best = int(tried.argmin())
-    if best in (0, len(RADII) - 1):
-        return None
-    own = _least(cost, RADII[best - 1] * radius, RADII[best + 1] * radius)
-    least = cost(own)
-    return center_of(own), own, cost(radius) - least, cost(1e-3 * radius) - least
-
-
-def _slide(
-    local: FloatArray, radius: float, upper: _Line, lower: _Line, deviation: float
-) -> tuple[FloatArray, float, float, float] | None:
-    """Find the centre of the arc that touches two parallel lines."""
-    across = upper.normal - lower.normal
-    across /= np.linalg.norm(across)
-    own = 0.5 * (upper.offset + lower.offset)
-    if not 0.35 * radius < own < 1.5 * radius:
-        return None
-    along = np.array([across[1], -across[0]])
-    along *= math.copysign(1.0, along[0])
-    middle = (upper.offset - own) * across
-
-    def cost(place: float) -> float:
-        return _cost(local, middle + place * along, own, (upper, lower), deviation)
-
-    places = np.linspace(-1.0, 1.0, 41) * radius
-    tried = np.array([cost(place) for place in places])
-    best = int(tried.argmin())
-    if best in (0, len(places) - 1):
-        return None
-    place = _least(cost, places[best - 1], places[best + 1])
-    least = cost(place)
-    return middle + place * along, own, float(tried[20]) - least, float(tried.max()) - least
-
-
-def _least(cost: Callable[[float], float], low: float, high: float) -> float:
-    """Return where a function of one minimum between two values is least (golden sections)."""
-    ratio = 0.5 * (math.sqrt(5.0) - 1.0)
-    one, two = high - ratio * (high - low), low + ratio * (high - low)
-    first, second = cost(one), cost(two)
-    for _ in range(16):
-        if first < second:
-            high, two, second = two, one, first
-            one = high - ratio * (high - low)
-            first = cost(one)
+        kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
+        if abs(residual) >= width or along < 0.0 or along > reach:
+            continue
+        if kind == 0:
+            x, y = local[i, 0] - profile[CENTER_X], local[i, 1] - profile[CENTER_Y]
+            distance = max(residual + profile[OWN], 1e-12 * profile[OWN])
+            x, y = x / distance, y / distance
         else:
-            low, one, first = one, two, second
-            two = low + ratio * (high - low)
-            second = cost(two)
-    return 0.5 * (low + high)
+            k = 2 if kind > 0 else 0
+            x, y = normals[k], normals[k + 1]
+        x, y = heights[i] * x, heights[i] * y
+        weight = (1.0 - (residual / width) ** 2) ** 2
+        matrix[0, 0] += weight * x * x
+        matrix[0, 1] += weight * x * y
+        matrix[1, 0] += weight * x * y
+        matrix[1, 1] += weight * y * y
+        right[0] += weight * x * residual
+        right[1] += weight * y * residual
+
+
+@njit(cache=True, nogil=True)
+def _explained(local: FloatArray, profile: FloatArray, reach: float, deviation: float) -> tuple[float, float]:
+    """Return the sum of squared residuals, clipped, in squared deviations, and the mean of those that are not clipped.
+
+    In the sum, what is on no part of the profile counts as far.
+    """
+    normals = np.zeros(4)
+    _fill_normals(profile, normals)
+    total, own, count = 0.0, 0.0, 0
+    for i in range(len(local)):
+        _, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
+        ratio = min(abs(residual) / deviation, CLIPPED)
+        if along < 0.0 or along > reach:
+            ratio = CLIPPED
+        total += ratio * ratio
+        if ratio < CLIPPED:
+            own += ratio * ratio
+            count += 1
+    return total, own / max(count, 1)
+
+
+@njit(cache=True, nogil=True)
+def _seen(
+    local: FloatArray, profile: FloatArray, reach: float, deviation: float
+) -> tuple[int, int, int, int, float, float]:
+    """Return what speaks for a profile.
+
+    Points on the upper and on the lower line, clear of the arc, on the arc, and about it; of these the sum of squares,
+    clipped; and what the arc gains over its two lines.
+    """
+    normals = np.zeros(4)
+    _fill_normals(profile, normals)
+    upper, lower, on_arc, about = 0, 0, 0, 0
+    squares, edge = 0.0, 0.0
+    for i in range(len(local)):
+        kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
+        near = abs(residual) < NEAR_LINE * deviation
+        if kind == 0:
+            on_arc += near
+            if abs(residual) >= ABOUT * profile[OWN]:
+                continue
+            ratio = min(abs(residual) / deviation, CLIPPED)
+            about += 1
+            squares += ratio * ratio
+            x, y = local[i, 0] - profile[CENTER_X], local[i, 1] - profile[CENTER_Y]
+            one = abs(x * normals[0] + y * normals[1] - profile[OWN])
+            two = abs(x * normals[2] + y * normals[3] - profile[OWN])
+            flat = min(one / deviation, two / deviation, CLIPPED)
+            edge += flat * flat - ratio * ratio
+        elif near and CLEAR * profile[OWN] < along <= reach:
+            upper += kind > 0
+            lower += kind < 0
+    return upper, lower, on_arc, about, squares, edge

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from cylx.fits.profile import fit_profile
+from cylx.fits.profile import LINE_LENGTH, fit_profile, tilt_of
 from cylx.geometry.arrays import FloatArray
-from cylx.geometry.cylinder import RADIUS, coordinates_of
+from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.geometry.numerics import fill_basis
 from cylx.records import IndexedCloud, Segment
 
@@ -23,8 +23,12 @@ ENOUGH_OF_PROFILE = 3000
 LEAST_DEVIATION = 0.004
 """Deviation of the points, in radii, from which they hide where an arc ends; of less, their normals show it."""
 LEAST_GAIN = 12.0
-"""A profile replaces the fit if its squared residuals are smaller by so many squared deviations."""
-MOST_CHI_SQUARE = 2.0
+"""An arc is one if its squared residuals are smaller than those of the sharp edge by so many squared deviations."""
+ENDS = 2.5
+"""What lies within so many deviations of the ends may be of a lid."""
+LEANS = 2
+"""The profile is fitted so many times, and the axis after each."""
+MOST_CHI_SQUARE = 3.0
 """Mean square, in squared deviations and clipped at nine, of the residuals of its points."""
 
 
@@ -58,34 +62,42 @@ def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], 
 
 def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
     """Fit an arc and the planes that touch it as one; None if these are not there."""
-    model, half, radius = segment.model, segment.half, segment.radius
-    deviation = indexed.noise_about(model, half)
+    half, radius = segment.half, segment.radius
+    deviation = indexed.noise_about(segment.model, half)
     if deviation < LEAST_DEVIATION * radius:
         return None
-    near = indexed.cells.near_cylinder(model, -half, half, 0.0, REACH * radius)
+    within = half - min(ENDS * deviation, 0.25 * half)  # without what closes the ends
+    near = indexed.cells.near_cylinder(segment.model, -within, within, 0.0, REACH * radius)
     near = near[:: 1 + len(near) // ENOUGH_OF_PROFILE]
     if len(near) == 0:
         return None
-    _, residuals, angles = coordinates_of(indexed.points, near, model)
-    on = np.abs(residuals) < 3.0 * deviation
-    if not on.any():
-        return None
-    middle = math.atan2(float(np.sin(angles[on]).mean()), float(np.cos(angles[on]).mean()))
-    distances = residuals + radius
-    flat = np.column_stack([distances * np.cos(angles), distances * np.sin(angles)])
-    profile = fit_profile(flat, radius, middle, deviation)
-    if profile is None or profile.gain < LEAST_GAIN or profile.edge_gain < LEAST_GAIN:
-        return None
+    model, profile = segment.model, None
+    for _ in range(LEANS):
+        heights, residuals, angles = coordinates_of(indexed.points, near, model)
+        distances = residuals + model[RADIUS]
+        flat = np.column_stack([distances * np.cos(angles), distances * np.sin(angles)])
+        middle = None if profile is None else profile.middle
+        if middle is None:
+            on = np.abs(residuals) < 3.0 * deviation
+            if not on.any():
+                return None
+            middle = math.atan2(float(np.sin(angles[on]).mean()), float(np.cos(angles[on]).mean()))
+        profile = fit_profile(flat, float(model[RADIUS]), middle, deviation)
+        if profile is None or profile.edge_gain < LEAST_GAIN:
+            return None
+        lean = tilt_of(flat, heights, profile, LINE_LENGTH * float(model[RADIUS]), deviation)
+        basis = np.empty((2, 3))
+        fill_basis(model[DIRECTION], basis)
+        model = model.copy()
+        model[POINT] += profile.center @ basis
+        model[RADIUS] = profile.radius
+        model[DIRECTION] += lean @ basis
+        model[DIRECTION] /= np.linalg.norm(model[DIRECTION])
+    assert profile is not None
     if profile.chi_square > MOST_CHI_SQUARE:
         return None
-    basis = np.empty((2, 3))
-    fill_basis(segment.direction, basis)
-    moved = model.copy()
-    moved[:3] += profile.center @ basis
-    moved[RADIUS] = profile.radius
-    return replace(
-        segment, model=moved, spread=deviation, flat_share=1.0, wedge=_wedge(basis, profile.middle, profile.opening)
-    )
+    wedge = _wedge(basis, profile.middle, profile.opening)
+    return replace(segment, model=model, spread=deviation, flat_share=1.0, wedge=wedge)
 
 
 def _wedge(basis: FloatArray, middle: float, opening: float) -> FloatArray:
