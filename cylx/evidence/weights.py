@@ -200,16 +200,16 @@ BLEND_TERMS = (
     Term("inside", -1.231, 0.53, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
 )
 
-PROFILE_BIAS = -6.978
+PROFILE_BIAS = -0.484
 PROFILE_TERMS = (
-    Term("form", -1.730, 0.00, lambda m: _log(m["structure_radii"] / 0.01, 1.0, 10.0)),
-    Term("oval", -116.8, 0.00, lambda m: min(m["ovality"], 0.05)),
-    Term("edge", 0.583, 1.59, lambda m: _log(m["edge_gain"] / max(m["inliers"], 20.0), 0.02, 5.0)),
-    Term("tangent", 2.830, 0.88, lambda m: min(m["tangent_both"], 1.0)),
-    Term("few points", 0.803, 0.71, lambda m: _log(m["inliers"] / 100.0, 0.2, 3.0)),
-    Term("curvature", 1.788, 1.33, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
-    Term("payoff", 5.460, 0.79, lambda m: m["payoff"]),
-    Term("bend", -22.08, 0.00, lambda m: min(m["bend"], 0.2)),
+    Term("noise", -21.204, 0.03, lambda m: _log(m["noise_ratio"], 1.0, 2.0)),
+    Term("form", -0.626, 0.10, lambda m: min(m["structure"], 1.5)),
+    Term("oval", -47.833, 0.00, lambda m: min(m["ovality"], 0.05)),
+    Term("lack of fit", -1.753, 0.33, lambda m: _log(m["lack_of_fit"], 1.0, 8.0)),
+    Term("edge", 0.441, 1.39, lambda m: _log(m["edge_gain"] / max(m["inliers"], 20.0), 0.02, 5.0)),
+    Term("tangent", 1.939, 0.94, lambda m: min(m["tangent_both"], 1.0)),
+    Term("few points", 3.399, 0.68, lambda m: _log(m["inliers"] / 100.0, 0.2, 3.0)),
+    Term("roughness", -4.613, 0.03, lambda m: _log(m["roughness"], 1.0, 1.5)),
 )
 
 

@@ -67,19 +67,19 @@ class Prior(NamedTuple):
     direction: FloatArray | None = None
     direction_deviation: float = math.inf
 
-    def as_far_as_borne_out(self, fit: MixtureFit) -> Prior | None:
-        """Drop the parts that contradict a fit without the prior (see `CONTRADICTION`); return None if all do."""
+    def as_far_as_borne_out(self, fit: MixtureFit, most: float = CONTRADICTION) -> Prior | None:
+        """Drop the parts that differ from a fit without the prior by more than `most` deviations; None if all do."""
         covariance, kept = fit.covariance, self
         if self.radius is not None:
             away = fit.model[RADIUS] - self.radius
-            if away**2 > CONTRADICTION**2 * (covariance[4, 4] + self.radius_deviation**2):
+            if away**2 > most**2 * (covariance[4, 4] + self.radius_deviation**2):
                 kept = kept._replace(radius=None)
         if self.direction is not None:
             basis = np.empty((2, 3))
             fill_basis(fit.model[DIRECTION], basis)
             tilts = basis @ self.direction * np.sign(self.direction @ fit.model[DIRECTION])
             spread = covariance[2:4, 2:4] + self.direction_deviation**2 * np.eye(2)
-            if tilts @ np.linalg.solve(spread, tilts) > CONTRADICTION**2:
+            if tilts @ np.linalg.solve(spread, tilts) > most**2:
                 kept = kept._replace(direction=None)
         return None if kept.radius is None and kept.direction is None else kept
 

@@ -111,8 +111,8 @@ def search_cylinders(prepared: Prepared, log: StageLog) -> Search:
     with log.stage("curvature"):
         windows, explained = windows_and_explained(prepared, log)
     with log.stage("patches"):
-        patches, rims, normals = candidates_of_patches(prepared, explained, log)
-        indexed = IndexedCloud.of(prepared.frame, explained.flatness, normals)
+        patches, rims, normals, planes = candidates_of_patches(prepared, explained, log)
+        indexed = IndexedCloud.of(prepared.frame, explained.flatness, normals, planes)
     with log.stage("slicing"):
         slices = cut_slices(prepared, explained.flatness, log)
     with log.stage("ellipses"):

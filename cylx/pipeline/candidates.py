@@ -19,7 +19,7 @@ from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
 from cylx.stages.local_slices import slice_windows
 from cylx.stages.patches import find_curved_patches
-from cylx.stages.rims import find_rims
+from cylx.stages.rims import directions_of_planes, find_rims
 from cylx.stages.slicing import cut_slice, draw_planes
 
 LARGE = 6.0
@@ -45,7 +45,7 @@ def windows_and_explained(prepared: Prepared, log: StageLog) -> tuple[Candidates
 
 def candidates_of_patches(
     prepared: Prepared, explained: Explained, log: StageLog
-) -> tuple[Candidates, Candidates, NDArray[np.float32] | None]:
+) -> tuple[Candidates, Candidates, NDArray[np.float32] | None, FloatArray]:
     """Propose candidates from the nearest points of each point, and from circles about the normals of planes.
 
     Returns
@@ -53,18 +53,21 @@ def candidates_of_patches(
     patches, rims : Candidates
     normals : ndarray of shape (N, 3), float32, or None
         Of `Nearby`; None if the noise hides them everywhere.
+    planes : ndarray of shape (k, 3)
+        Unit normals of the directions that planes have.
     """
     frame, config, threads = prepared.frame, prepared.config.candidates, prepared.threads
     none = Candidates.joined([])
     if "curvature" not in config.sources:
-        return none, none, None
+        return none, none, None, np.empty((0, 3))
     patches, nearby, report = find_curved_patches(frame, explained, prepared.radii, config, threads)
     log.reports.append(report)
+    planes = directions_of_planes(frame, explained, nearby)
     if nearby is None:
-        return patches, none, None
-    rims, report = find_rims(frame, explained, nearby, prepared.radii, threads)
+        return patches, none, None, planes
+    rims, report = find_rims(frame, planes, nearby, prepared.radii, threads)
     log.reports.append(report)
-    return patches, rims, nearby.normals
+    return patches, rims, nearby.normals, planes
 
 
 def cut_slices(prepared: Prepared, flatness: FloatArray, log: StageLog) -> list[Slice | None]:

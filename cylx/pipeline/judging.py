@@ -19,6 +19,8 @@ SHORTEST_PIECE = 5.0
 UNEVEN, MOST_UNEVEN = 0.02, 0.1
 """Structure in the residuals, in radii, from which a long segment is looked at in pieces, as a trunk bends and tapers;
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
+MOST_ARC = math.radians(270.0)
+"""Angle of the surface from which a refused segment is no arc between two planes."""
 OF_FORM = frozenset(
     {"form", "agreement", "other shape", "cone, barrel or elbow", "lack of fit", "bend", "bulge", "slope", "facets"}
 )
@@ -93,10 +95,12 @@ class Judge:
         reason = verdict.reason
         if verdict.measures and not limits.enabled:
             reason = "coverage" if verdict.coverage < math.radians(limits.min_coverage_deg) else ""
-        if limits.enabled and limits.blends and may_be_arc(verdict, surely=not reason):
-            arc = self._judge_arc(segment, support, payoff)
-            if arc is not None:
-                return arc
+        if limits.enabled and limits.blends and verdict.measures:
+            goes_on = may_be_arc(verdict, surely=not reason)
+            if goes_on or (reason and verdict.coverage < MOST_ARC):
+                arc = self._judge_arc(segment, support, payoff, goes_on=goes_on)
+                if arc is not None:
+                    return arc
         if reason:
             confidence = verdict.confidence if verdict.measures else None
             return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
@@ -128,9 +132,10 @@ class Judge:
         found = fitted if isinstance(fitted, str) else self.judge(fitted, best.support, best.payoff)
         return found if isinstance(found, Finding) else None
 
-    def _judge_arc(self, segment: Segment, support: int, payoff: float) -> Finding | None:
-        """Verify a segment as an arc that goes on tangentially; None if it is none."""
-        for arc in arcs_of(segment, self._indexed, self._refit):
+    def _judge_arc(self, segment: Segment, support: int, payoff: float, *, goes_on: bool) -> Finding | None:
+        """Verify a segment as an arc that goes on tangentially, as far as is seen of it; None if it is none."""
+        refit = self._refit if goes_on else None
+        for arc in arcs_of(segment, self._indexed, refit):
             if self.out_of_range(arc):
                 continue
             verdict = verify(arc, self._indexed, payoff, self._windows.agreement(arc), self._limits, arc=True)

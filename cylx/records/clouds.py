@@ -249,17 +249,27 @@ class IndexedCloud:
         Frame units.
     normals : ndarray of shape (N, 3), float32, optional
         Unit normals, either way, of the points whose nearest neighbours tell it; zero where they do not.
+    planes : ndarray of shape (k, 3)
+        Unit normals of the directions that planes have in the cloud, either way.
     """
 
     cells: Cells
     flatness: FloatArray
     noise: Noise
     normals: NDArray[np.float32] | None = None
+    planes: FloatArray = field(default_factory=lambda: np.empty((0, 3)))
 
     @classmethod
-    def of(cls, frame: Frame, flatness: FloatArray, normals: NDArray[np.float32] | None = None) -> IndexedCloud:
+    def of(
+        cls,
+        frame: Frame,
+        flatness: FloatArray,
+        normals: NDArray[np.float32] | None = None,
+        planes: FloatArray | None = None,
+    ) -> IndexedCloud:
         """Put the points of a frame into cells."""
-        return cls(Cells(frame.points, frame.codes), flatness, frame.noise, normals)
+        known = np.empty((0, 3)) if planes is None else planes
+        return cls(Cells(frame.points, frame.codes), flatness, frame.noise, normals, known)
 
     @property
     def points(self) -> FloatArray:

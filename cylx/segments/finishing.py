@@ -10,7 +10,7 @@ import numpy as np
 
 from cylx.fits.conditioning import given_radius
 from cylx.fits.correlated_error import shared_covariance
-from cylx.fits.likelihood import Prior, fit_mixture
+from cylx.fits.likelihood import MixtureFit, Prior, fit_mixture
 from cylx.fits.nominal_radius import Catalogue, choose_entry
 from cylx.fits.robust import FIT_BEYOND_ENDS
 from cylx.geometry.arrays import FloatArray
@@ -20,6 +20,14 @@ from cylx.segments.refitting import REFIT_STEPS, ROUGH_TOLERANCE, refit, robust_
 
 STRUCTURED_LACK_OF_FIT = 1.4
 """A lack of fit (chi-square per cell) beyond this is none by chance."""
+SHORT = 1.0
+"""A cylinder whose half height is less than so many radii is short."""
+NEARLY_UPRIGHT = math.cos(math.radians(12.0))
+"""Cosine of the angle to the normal of a plane up to which an axis may stand on it."""
+LEANING = 3.5
+"""It leans if its points say so by more than this many deviations."""
+UPRIGHT_DEVIATION = math.radians(0.5)
+"""Standard deviation of the tilt against that normal of what stands on a plane."""
 WIDEST_IN_LAST_FIT = 8.0
 """Deviations from the surface up to which points have a say in the last fit; outliers are hardly further away."""
 ON_SURFACE = 3.0
@@ -87,6 +95,11 @@ def finish(
     if likely is None:
         return refit(segment, indexed)
     prior = None if known is None else known.as_far_as_borne_out(likely)
+    if inflated == 1.0 and (prior is None or prior.direction is None):
+        upright = _upright(segment, indexed.planes, likely)
+        prior = upright if prior is None or upright is None else prior._replace(
+            direction=upright.direction, direction_deviation=upright.direction_deviation
+        )
     robust = inflated > 1.0 and prior is None
     if robust:
         fitted = refit(segment, indexed)
@@ -117,6 +130,21 @@ def finish(
     _turn_as_given(start)
     moved, covariance = given_radius(start, covariance, nominal, tolerance)
     return replace(free, model=moved, covariance=covariance, choice=choice)
+
+
+def _upright(segment: Segment, planes: FloatArray, fit: MixtureFit) -> Prior | None:
+    """Return the prior of a short cylinder that its axis is the normal of a plane; None if the points say otherwise.
+
+    The tilt of a disc, of a bore in a plate or of a pin is hardly seen in its few points, and what crosses its ends
+    bends it. Nearly all of them stand on a plane or end at one.
+    """
+    if segment.half > SHORT * segment.radius or segment.wedge is not None or len(planes) == 0:
+        return None
+    cosines = planes @ segment.direction
+    best = int(np.abs(cosines).argmax())
+    if abs(cosines[best]) < NEARLY_UPRIGHT:
+        return None
+    return Prior(direction=planes[best], direction_deviation=UPRIGHT_DEVIATION).as_far_as_borne_out(fit, LEANING)
 
 
 def _with_shared_error(covariance: FloatArray, points: FloatArray, fitted: Segment, inflated: float) -> FloatArray:

@@ -32,7 +32,7 @@ MOST_CHI_SQUARE = 3.0
 """Mean square, in squared deviations and clipped at nine, of the residuals of its points."""
 
 
-def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], Segment | str]) -> list[Segment]:
+def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], Segment | str] | None) -> list[Segment]:
     """Fit a cylinder again as an arc between planes that touch it.
 
     An arc between two planes takes some of their points within the noise, and its radius comes out too large. Where
@@ -42,14 +42,17 @@ def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], 
     ----------
     segment : Segment
     indexed : IndexedCloud
-    refit : callable
-        Fits a segment to its points; why there is none if that fails.
+    refit : callable or None
+        Fits a segment to its points; why there is none if that fails. With None, it is only fitted with the planes.
 
     Returns
     -------
     list of Segment
         The arc with its planes and the arc without them, as far as they are there; the more certain one first.
     """
+    if refit is None:
+        own = _with_profile(segment, indexed)
+        return [] if own is None else [own]
     narrowed: Segment | str = replace(segment, flat_share=ARC_FLAT)
     for _ in range(ARC_STEPS):
         if isinstance(narrowed, str):
@@ -71,13 +74,16 @@ def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
     near = near[:: 1 + len(near) // ENOUGH_OF_PROFILE]
     if len(near) == 0:
         return None
-    model, profile = segment.model, None
+    model, profile, wedge = segment.model, None, None
+    basis = np.empty((2, 3))
     for _ in range(LEANS):
+        fill_basis(model[DIRECTION], basis)
         heights, residuals, angles = coordinates_of(indexed.points, near, model)
         distances = residuals + model[RADIUS]
         flat = np.column_stack([distances * np.cos(angles), distances * np.sin(angles)])
-        middle = None if profile is None else profile.middle
-        if middle is None:
+        if wedge is not None:  # the basis may have turned with the axis
+            middle = math.atan2(float(wedge[:3] @ basis[1]), float(wedge[:3] @ basis[0]))
+        else:
             on = np.abs(residuals) < 3.0 * deviation
             if not on.any():
                 return None
@@ -86,17 +92,14 @@ def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
         if profile is None or profile.edge_gain < LEAST_GAIN:
             return None
         lean = tilt_of(flat, heights, profile, LINE_LENGTH * float(model[RADIUS]), deviation)
-        basis = np.empty((2, 3))
-        fill_basis(model[DIRECTION], basis)
+        wedge = _wedge(basis, profile.middle, profile.opening)
         model = model.copy()
         model[POINT] += profile.center @ basis
         model[RADIUS] = profile.radius
         model[DIRECTION] += lean @ basis
         model[DIRECTION] /= np.linalg.norm(model[DIRECTION])
-    assert profile is not None
-    if profile.chi_square > MOST_CHI_SQUARE:
+    if profile is None or profile.chi_square > MOST_CHI_SQUARE:
         return None
-    wedge = _wedge(basis, profile.middle, profile.opening)
     return replace(segment, model=model, spread=deviation, flat_share=1.0, wedge=wedge)
 
 

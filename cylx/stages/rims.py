@@ -47,16 +47,33 @@ WIDEST, CAPACITY = 6.0, 512
 """Spacings about a point in which it is asked for a plane, and points that are gathered."""
 
 
-def find_rims(
-    frame: Frame, explained: Explained, nearby: Nearby, radius_range: tuple[float, float], threads: int
-) -> tuple[Candidates, StageReport]:
-    """Propose a cylinder for each circle about the direction of a plane.
+def directions_of_planes(frame: Frame, explained: Explained, nearby: Nearby | None) -> FloatArray:
+    """Return the unit normals of the directions that planes have in a cloud, either way, shape (k, 3).
 
     Parameters
     ----------
     frame : Frame
     explained : Explained
         Its flat windows are pieces of planes.
+    nearby : Nearby or None
+        From `find_curved_patches`.
+    """
+    normals = _normals_of_planes(frame, explained.flatness)
+    if nearby is not None:
+        normals = np.concatenate([normals, nearby.normals[nearby.looked_at[nearby.within]].astype(np.float64)])
+    return np.array(directions_of(normals)).reshape(-1, 3)
+
+
+def find_rims(
+    frame: Frame, directions: FloatArray, nearby: Nearby, radius_range: tuple[float, float], threads: int
+) -> tuple[Candidates, StageReport]:
+    """Propose a cylinder for each circle about the direction of a plane.
+
+    Parameters
+    ----------
+    frame : Frame
+    directions : ndarray of shape (k, 3)
+        Of planes, from `directions_of_planes`.
     nearby : Nearby
         From `find_curved_patches`.
     radius_range : tuple of float
@@ -67,8 +84,6 @@ def find_rims(
     candidates : Candidates
     report : StageReport
     """
-    planes = nearby.normals[nearby.looked_at[nearby.within]].astype(np.float64)
-    directions = directions_of(np.concatenate([_normals_of_planes(frame, explained.flatness), planes]))
     which = nearby.looked_at[~nearby.within]  # what lies within a plane is no wall
     parts, tried = [], 0
     for direction in directions:

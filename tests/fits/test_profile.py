@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.fits.profile import Profile, fit_profile
+from cylx.fits.profile import Profile, fit_profile, tilt_of
 
 seeds = st.integers(0, 2**32 - 1)
 laws = settings(max_examples=12, deadline=None)
@@ -125,3 +125,35 @@ def test_an_arc_with_one_line_or_with_few_points_has_none():
     assert fit_profile(one_line, 1.0, 0.0, 0.02) is None
     assert fit_profile(points[:15], 1.0, 0.0, 0.02) is None
     assert fit_profile(np.empty((0, 2)), 1.0, 0.0, 0.02) is None
+
+
+@pytest.mark.parametrize("turn_deg", [45, 90, 135, 180, 220])
+@pytest.mark.parametrize("start", [0.8, 1.0, 1.25, 1.5])
+def test_the_arc_is_the_same_from_any_first_circle(turn_deg, start):
+    points = rounded(np.random.default_rng(3), turn_deg, 0.02)
+    # it lies on the middle of the arc
+    profile = fit_profile(points - [1.0 - start, 0.0], start, 0.0, 0.02)
+    assert profile.radius == pytest.approx(1.0, abs=0.03)
+    assert profile.center + [1.0 - start, 0.0] == pytest.approx([0, 0], abs=0.05)
+    assert 2.0 * np.degrees(profile.opening) == pytest.approx(turn_deg, abs=5.0)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.4])
+def test_what_else_lies_about_does_not_draw_the_arc(share):
+    rng = np.random.default_rng(4)
+    points = rounded(rng, 90, 0.02)
+    others = rng.uniform(-2.5, 2.5, (round(share * COUNT), 2))
+    profile = fit_profile(np.concatenate([points, others]), 1.2, 0.0, 0.02)
+    assert profile.radius == pytest.approx(1.0, abs=0.05)
+
+
+@laws
+@given(seeds, st.floats(-0.03, 0.03), st.floats(-0.03, 0.03))
+def test_the_lean_of_the_axis_is_seen_in_the_points(seed, x, y):
+    rng = np.random.default_rng(seed)
+    points = rounded(rng, 90, 0.02)
+    heights = rng.uniform(-2, 2, COUNT)
+    profile = fit_profile(points, 1.0, 0.0, 0.02)
+    lean = tilt_of(points + heights[:, None] * [x, y], heights, profile, LENGTH, 0.02)
+    assert lean == pytest.approx([x, y], abs=0.006)
+    assert tilt_of(np.empty((0, 2)), np.empty(0), profile, LENGTH, 0.02) == pytest.approx([0, 0])

@@ -1,6 +1,7 @@
 """A catalogue from end to end: what is snapped, what is left as it is, and what it does to axis and covariance."""
 
 import json
+from dataclasses import replace
 
 import jsonschema
 import numpy as np
@@ -279,3 +280,51 @@ def test_the_command_refuses_a_bad_catalogue_before_it_reads_the_scan(run_cylx, 
         2,
         "cylx: scene.catalogue: contradicts scene.known_radius; leave one of them out\n",
     )
+
+
+# what stands on a plane
+
+
+def pin(lean_deg, height, seed, sigma=0.03):
+    """Draw a pin of radius 1 that leans in the plane of x and z."""
+    rng = np.random.default_rng(seed)
+    count = round(60 * height)
+    turn = 2 * np.pi * rng.random(count)
+    points = np.column_stack([np.cos(turn), np.sin(turn), height * (rng.random(count) - 0.5)])
+    cosine, sine = np.cos(np.radians(lean_deg)), np.sin(np.radians(lean_deg))
+    return points @ np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]).T + sigma * rng.standard_normal(
+        points.shape
+    )
+
+
+def lean_found(points, height, start_deg, planes):
+    """Finish a cylinder that leans so much; give the angle of its axis to z."""
+    indexed, frame = ground_of(points, 0.03)
+    indexed = replace(indexed, planes=np.array(planes, dtype=np.float64).reshape(-1, 3))
+    direction = [np.sin(np.radians(start_deg)), 0.0, np.cos(np.radians(start_deg))]
+    model = np.concatenate([-frame.origin / frame.spacing, direction, [1.0 / frame.spacing]])
+    fit = finish(Segment(model, 0.5 * height / frame.spacing, 0.03 / frame.spacing), indexed)
+    return np.degrees(np.arccos(min(1.0, abs(fit.direction[2]))))
+
+
+UPRIGHT = [[0.0, 0.0, -1.0]]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_short_pin_on_a_plane_stands_upright(seed):
+    points = pin(0.0, 0.5, seed)
+    free, upright = (lean_found(points, 0.5, 2.0, planes) for planes in ([], UPRIGHT))
+    assert upright < 0.3
+    assert upright < free
+
+
+def test_a_pin_that_leans_stays_so():
+    points = pin(9.0, 0.8, 0)
+    assert lean_found(points, 0.8, 9.0, UPRIGHT) == pytest.approx(9.0, abs=1.5)
+
+
+def test_a_long_pipe_and_a_plane_far_off_its_axis_are_left_alone():
+    points = pin(1.0, 4.0, 0)
+    assert lean_found(points, 4.0, 1.0, UPRIGHT) == pytest.approx(lean_found(points, 4.0, 1.0, []), abs=1e-9)
+    points = pin(0.0, 0.5, 0)
+    assert lean_found(points, 0.5, 0.0, [[1.0, 0, 0]]) == pytest.approx(lean_found(points, 0.5, 0.0, []), abs=1e-9)

@@ -74,3 +74,27 @@ def test_a_pipe_is_fitted_with_no_planes():
 def test_where_nothing_lies_there_is_no_arc_with_planes():
     arcs, _, _ = arcs_in(pipe(), 0.2, 30.0)
     assert [arc.wedge for arc in arcs] == [None] * len(arcs)
+
+
+@pytest.mark.parametrize("ratio", [0.8, 1.3, 1.6])
+def test_an_arc_is_found_from_a_circle_that_is_far_too_small_or_too_large(ratio):
+    points, _ = rounded_edge()
+    arcs, _, frame = arcs_in(points, ratio, 1.0 - ratio)
+    assert arcs[0].radius * frame.spacing == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("tilt_deg", [1.0, 3.0])
+def test_the_axis_is_that_of_the_planes_though_the_segment_leans(tilt_deg):
+    points, _ = rounded_edge()
+    indexed, segment, _ = in_frame(points, 1.1, -0.1)
+    model = segment.model.copy()
+    model[3:6] = [0.0, np.sin(np.radians(tilt_deg)), np.cos(np.radians(tilt_deg))]
+    leaning = Segment(model, segment.half, segment.spread)
+    arc = arcs_of(leaning, indexed, None)[0]
+    assert arc.wedge is not None
+    assert np.degrees(np.arccos(min(1.0, arc.direction[2]))) < 0.2 * tilt_deg + 0.1
+
+
+def test_without_a_refit_there_are_only_arcs_with_planes():
+    indexed, segment, _ = in_frame(pipe())
+    assert arcs_of(segment, indexed, None) == []

@@ -15,7 +15,7 @@ def proposed(points):
     prepared = prepare(PointCloud(points), Config())
     log = StageLog(SilentObserver())
     _, explained = windows_and_explained(prepared, log)
-    found, _, normals = candidates_of_patches(prepared, explained, log)
+    found, _, normals, _ = candidates_of_patches(prepared, explained, log)
     models = found.models.copy()
     models[:, 6] *= prepared.frame.spacing
     models[:, :3] = models[:, :3] * prepared.frame.spacing + prepared.frame.origin

@@ -84,7 +84,7 @@ def rims_of(points):
     prepared = prepare(PointCloud(points), Config())
     log = StageLog(SilentObserver())
     _, explained = windows_and_explained(prepared, log)
-    _, rims, _ = candidates_of_patches(prepared, explained, log)
+    _, rims, _, _ = candidates_of_patches(prepared, explained, log)
     assert log.reports[-1].name == "rims"
     assert log.reports[-1].kept == len(rims)
     models = rims.models.copy()
