@@ -14,8 +14,9 @@ cameras and stems (three times); false fits weigh 1.2 times as much as true ones
 fits the weights. That of the slope was raised from 2 to 10 by hand, because a slope that counts more where it is steep
 was not among the terms then. No term may speak against its own meaning: the signs are fixed before the fit. Fits near
 a true cylinder that were neither clearly it nor clearly another were left out, and so were arcs that go on
-tangentially: these have weights of their own, from the same CAD parts, and those that were fitted with the planes that
-touch them have others.
+tangentially: these have weights of their own, from the same CAD parts. Those that were fitted with the planes that
+touch them have others, from 1 760 verdicts on such arcs, one in eleven of them true, in 101 of these clouds: of two
+thirds of the parts, with noise of 0.2 spacings, some with less.
 
 The agreement was then measured at all sizes of windows that seemed large enough; since it is that of the size at which
 most agree, and a prism counts where noise hides its faces, the same weights were held against 25 000 fits anew: fitted
@@ -216,7 +217,8 @@ PROFILE_TERMS = (
 def weigh_profile(measures: Mapping[str, float]) -> float:
     """Return the probability that an arc which was fitted with the two planes that touch it is a piece of a cylinder.
 
-    Candidates of windows that see the planes, too, are too large; so it is not asked whether they agree.
+    Candidates of windows that see the planes, too, are too large; so it is neither asked whether they agree, nor how
+    well those of its cluster do.
 
     Parameters
     ----------

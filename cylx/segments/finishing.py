@@ -97,8 +97,10 @@ def finish(
     prior = None if known is None else known.as_far_as_borne_out(likely)
     if inflated == 1.0 and (prior is None or prior.direction is None):
         upright = _upright(segment, indexed.planes, likely)
-        prior = upright if prior is None or upright is None else prior._replace(
-            direction=upright.direction, direction_deviation=upright.direction_deviation
+        prior = (
+            upright
+            if prior is None or upright is None
+            else prior._replace(direction=upright.direction, direction_deviation=upright.direction_deviation)
         )
     robust = inflated > 1.0 and prior is None
     if robust:

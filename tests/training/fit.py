@@ -1,10 +1,11 @@
 """Fit the weights of `cylx.evidence` to rows of `collect.py`, `real.py`, `things.py` and `arcs.py`.
 
 The terms and their signs are those of `cylx.evidence.weights`, and the weights are fitted anew: of `TERMS` to fits, of
-`BLEND_TERMS` to the arcs of `arcs.py`. All tables are cross-validated by scene: each fit is judged by weights that were
-found without its scene, and without others of the same thing, such as a CAD part under another noise. Fits of a true
-cylinder that need not be found, and those near one that are neither it nor something else, are counted and left out.
-So are arcs of CAD parts that go on tangentially, unless they are false: as cylinders they may be missed.
+`BLEND_TERMS` and `PROFILE_TERMS` to the arcs of `arcs.py`, without and with the planes that touch them. All tables are
+cross-validated by scene: each fit is judged by weights that were found without its scene, and without others of the
+same thing, such as a CAD part under another noise. Fits of a true cylinder that need not be found, and those near one
+that are neither it nor something else, are counted and left out. So are arcs of CAD parts that go on tangentially,
+unless they are false: as cylinders they may be missed.
 """
 
 import argparse
@@ -22,7 +23,7 @@ sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from tables import number, print_header, print_row
 
 from cylx.config import VerificationConfig
-from cylx.evidence.weights import BLEND_TERMS, TERMS
+from cylx.evidence.weights import BLEND_TERMS, PROFILE_TERMS, TERMS
 from cylx.stages.verification import GOES_ON
 
 LEAST = VerificationConfig().min_inliers
@@ -245,10 +246,13 @@ def main():
         if a.plot:
             draw(probability, rows, a.plot)
     if arcs:
-        rows, counts = table_of(arcs, BLEND_TERMS), Counter(line["label"] for line in arcs)
-        scenes = len(set(rows.scenes))
-        print(f"\n{scenes} scenes, {len(arcs)} arcs: {', '.join(f'{n} {k}' for k, n in counts.items())}\n")
-        print_law(rows, signs_of(BLEND_TERMS), BLEND_TERMS, "BLEND_BIAS", BLEND_STRENGTH)
+        laws = {"BLEND_BIAS": (BLEND_TERMS, "arcs", False), "PROFILE_BIAS": (PROFILE_TERMS, "arcs with planes", True)}
+        for bias, (terms, what, with_planes) in laws.items():
+            own = [line for line in arcs if (line["measures"]["arc"] > 0.0) == with_planes]
+            rows, counts = table_of(own, terms), Counter(line["label"] for line in own)
+            scenes = len(set(rows.scenes))
+            print(f"\n{scenes} scenes, {len(own)} {what}: {', '.join(f'{n} {k}' for k, n in counts.items())}\n")
+            print_law(rows, signs_of(terms), terms, bias, BLEND_STRENGTH)
     return 0
 
 
