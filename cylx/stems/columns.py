@@ -1,20 +1,22 @@
-"""The points of a plot by upright columns, so that those about an axis are found without a look at the others."""
+"""The points of a plot in cells, so that those about an axis are found without a look at the others."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.kernels import njit
 
-SIDE = 0.5
-"""Side of a column, metres."""
+SIDE = 0.25
+"""Side of a cell, metres."""
 THIN = 0.01
 """Points are thinned to cells of this side before anything is fitted to them, metres: the noise of a good scanner."""
 
 
 class Columns:
-    """Points in columns.
+    """Points in cells.
 
     Parameters
     ----------
@@ -24,26 +26,44 @@ class Columns:
 
     def __init__(self, points: FloatArray) -> None:
         self.points = points
-        self._corner = np.floor(points[:, :2].min(axis=0) / SIDE).astype(np.int64)
-        cells = np.floor(points[:, :2] / SIDE).astype(np.int64) - self._corner
-        self._shape = tuple(int(n) for n in cells.max(axis=0) + 1)
-        flat = cells[:, 0] * self._shape[1] + cells[:, 1]
-        counts = np.bincount(flat, minlength=self._shape[0] * self._shape[1])
+        self._corner = np.floor(points.min(axis=0) / SIDE).astype(np.int64)
+        self._shape = np.floor(points.max(axis=0) / SIDE).astype(np.int64) - self._corner + 1
+        flat = np.empty(len(points), np.int64)
+        _number_cells(points, self._corner, self._shape, flat)
+        counts = np.bincount(flat, minlength=int(np.prod(self._shape)))
         self._starts = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self._order = np.empty(len(points), np.int64)
         _sort_by_count(flat, self._starts[:-1].copy(), self._order)
 
-    def about(self, start: FloatArray, end: FloatArray, reach: float) -> IndexArray:
-        """Return the points of all columns within a distance of the line between two places (2,) or (3,)."""
-        low = np.floor((np.minimum(start[:2], end[:2]) - reach) / SIDE).astype(np.int64) - self._corner
-        high = np.floor((np.maximum(start[:2], end[:2]) + reach) / SIDE).astype(np.int64) - self._corner
-        low, high = np.maximum(low, 0), np.minimum(high, np.array(self._shape) - 1)
+    def within(self, low: FloatArray, high: FloatArray) -> IndexArray:
+        """Return the points of all cells that a box along the axes, between two corners (3,), touches."""
+        first, last = self._cells(low, high)
         parts = [np.empty(0, np.int64)]
-        for i in range(int(low[0]), int(high[0]) + 1):
-            first, last = i * self._shape[1] + int(low[1]), i * self._shape[1] + int(high[1])
-            if last >= first:
-                parts.append(self._order[self._starts[first] : self._starts[last + 1]])
-        return np.concatenate(parts)
+        for i in range(int(first[0]), int(last[0]) + 1):
+            for j in range(int(first[1]), int(last[1]) + 1):
+                row = (i * self._shape[1] + j) * self._shape[2]
+                parts.append(self._order[self._starts[row + first[2]] : self._starts[row + last[2] + 1]])
+        return np.concatenate(parts) if (last >= first).all() else parts[0]
+
+    def slab(self, center: FloatArray, direction: FloatArray, reach: float, half: float) -> FloatArray:
+        """Return the points (n, 3) within a distance of an axis, and less than a height from a place on it."""
+        out = self.points[self.within(center - reach - half, center + reach + half)]
+        along = (out - center) @ direction
+        square = ((out - center) ** 2).sum(axis=1) - along**2
+        return np.asarray(out[(np.abs(along) < half) & (square < reach**2)])
+
+    def _cells(self, low: FloatArray, high: FloatArray) -> tuple[IndexArray, IndexArray]:
+        first = np.maximum(np.floor(low / SIDE).astype(np.int64) - self._corner, 0)
+        return first, np.minimum(np.floor(high / SIDE).astype(np.int64) - self._corner, self._shape - 1)
+
+
+@njit(cache=True, nogil=True)
+def _number_cells(points: FloatArray, corner: IndexArray, shape: IndexArray, flat: IndexArray) -> None:
+    for i in range(len(points)):
+        number = 0
+        for d in range(3):
+            number = number * shape[d] + int(math.floor(points[i, d] / SIDE)) - corner[d]
+        flat[i] = number
 
 
 @njit(cache=True, nogil=True)

@@ -43,21 +43,18 @@ class Stretch:
         self._columns, self._ground = columns, ground
 
     def section(
-        self, center: FloatArray, direction: FloatArray, radius: float, *, half: float = HALF, drift: float = 0.35
+        self, center: FloatArray, direction: FloatArray, radius: float, *, half: float = HALF, drift: float = 0.35,
+        shared: bool = False,
     ) -> Section | None:
         """Return the section of a stem about a place (3,) on its axis, None if it is not there."""
         reach = REACH * radius + 0.05
-        found = self._columns.points[self._columns.about(center, center, reach + half)]
-        along = (found - center) @ direction
-        near = np.abs(along) < half
-        across = found[near] - center - along[near, None] * direction
-        points = thinned(found[near][(across**2).sum(axis=1) < reach**2])
+        points = thinned(self._columns.slab(center, direction, reach, half))
         if len(points) < 12:
             return None
         first, second = axis_basis(direction)
         offsets = points - center
         xy = np.column_stack([offsets @ first, offsets @ second])
-        ring = fit_ring(xy, offsets @ direction, (0.0, 0.0, radius), drift=drift)
+        ring = fit_ring(xy, offsets @ direction, (0.0, 0.0, radius), drift=drift, shared=shared)
         if ring is None:
             return None
         middle = center + ring.x * first + ring.y * second

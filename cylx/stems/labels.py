@@ -23,13 +23,13 @@ def label_stems(stems: Sequence[Stem], columns: Columns) -> NDArray[np.int32]:
     """Return the index of the stem of each point, -1 for none."""
     labels = np.full(len(columns.points), -1, np.int32)
     for k, stem in enumerate(stems):
-        low, high = stem.sections[0], stem.sections[-1]
         centers = np.stack([one.center for one in stem.sections])
-        reach = 1.5 * max(one.diameter for one in stem.sections) + 0.1
-        indices = columns.about(centers.min(axis=0), centers.max(axis=0), reach)
+        reach = max(one.diameter for one in stem.sections)
+        bottom, top = centers.min(axis=0) - [reach, reach, BEYOND], centers.max(axis=0) + [reach, reach, BEYOND]
+        indices = columns.within(bottom, top)
         points = columns.points[indices]
         z = centers[:, 2]
-        near = (points[:, 2] > low.center[2] - BEYOND) & (points[:, 2] < high.center[2] + BEYOND)
+        near = (points[:, 2] > bottom[2]) & (points[:, 2] < top[2])
         indices, points = indices[near], points[near]
         x, y = (np.interp(points[:, 2], z, centers[:, d]) for d in (0, 1))
         radius = np.interp(points[:, 2], z, [0.5 * one.diameter for one in stem.sections])

@@ -26,6 +26,8 @@ NOISY = 0.2
 TAPER_FROM, TAPER_TO = 0.9, 8.0
 """Heights between which taper is measured: above the swell of the roots."""
 LEAST_OF_TAPER = 4
+MOST = 1.8
+"""Thicker stems are none that were searched for, metres."""
 WORST_SD = 0.15
 """Standard deviation of the diameter, in diameters, from which it says nothing."""
 
@@ -60,7 +62,7 @@ def measure_stem(axis: FloatArray, columns: Columns, ground: Ground) -> Stem | N
 def _start(stretch: Stretch, axis: FloatArray, direction: FloatArray, foot: float) -> Section | None:
     """Return the first section: at breast height, or as near to it as there is one."""
     middle = 0.5 * (axis[6] + axis[7])
-    for height in (BREAST_HEIGHT, middle, axis[6] + 0.3, axis[7]):
+    for height in (BREAST_HEIGHT, middle):
         center = np.array([*(axis[:2] + height * axis[2:4]), foot + height])
         found = stretch.section(center, direction, float(axis[4]), half=0.3)
         if found is not None and is_stem(found.ring):
@@ -94,15 +96,17 @@ def _described(stretch: Stretch, sections: list[Section], foot: float, filled: f
     direction = _direction_at(sections, BREAST_HEIGHT)
     place = _at(sections, BREAST_HEIGHT)
     nearest = min(sections, key=lambda one: abs(one.height - BREAST_HEIGHT))
-    breast = stretch.section(place, direction, nearest.ring.radius, half=BREAST_HALF, drift=0.2)
+    breast = stretch.section(place, direction, nearest.ring.radius, half=BREAST_HALF, drift=0.2, shared=True)
     measured = breast is not None and is_stem(breast.ring) and abs(nearest.height - BREAST_HEIGHT) < 0.3
+    if not measured:
+        nearest = stretch.section(nearest.center, nearest.direction, nearest.ring.radius, shared=True) or nearest
     known = breast if breast is not None and measured else nearest
     ring, dbh, sd = known.ring, 2.0 * known.ring.radius, 2.0 * known.ring.radius_sd
     if not measured:
         rise = known.height - BREAST_HEIGHT
         dbh += (0.0 if math.isnan(taper) else taper) * rise
         sd = math.hypot(sd, 0.01 * rise)
-    if dbh <= 0.0 or sd > WORST_SD * dbh:
+    if not 0.0 < dbh < MOST or sd > WORST_SD * dbh:
         return None
     quality = _quality(known, sections, filled, sd / dbh)
     flags = _flags(known, measured=measured, filled=filled, count=len(sections))

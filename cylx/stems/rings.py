@@ -24,7 +24,7 @@ STEPS = 25
 ON = 3.0
 """Points within so many deviations are on the ring."""
 LEAST_POINTS = 12
-SETTLED = 1e-5
+SETTLED = 1e-4
 EVEN = 0.2
 """A sector with less than this share of the usual points does not weigh as much as the others."""
 OVAL_ARC = 1.5 * math.pi
@@ -64,7 +64,7 @@ class Ring(NamedTuple):
 
 
 def fit_ring(
-    xy: FloatArray, heights: FloatArray, start: tuple[float, float, float], *, drift: float = 0.5
+    xy: FloatArray, heights: FloatArray, start: tuple[float, float, float], *, drift: float = 0.5, shared: bool = False
 ) -> Ring | None:
     """Fit a ring to points seen along an axis, from a start.
 
@@ -78,6 +78,8 @@ def fit_ring(
         Centre and radius.
     drift : float
         Share of the radius by which centre and radius may move from the start.
+    shared : bool
+        Whether the standard deviation allows for errors that neighbouring points share, which takes a while.
 
     Returns
     -------
@@ -98,7 +100,7 @@ def fit_ring(
     on = np.abs(residuals) < ON * deviation
     if on.sum() < LEAST_POINTS:
         return None
-    return _measured(circle, deviation, heights, residuals, angles, on)
+    return _measured(circle, deviation, heights, residuals, angles, on, shared=shared)
 
 
 def _measured(
@@ -108,6 +110,8 @@ def _measured(
     residuals: FloatArray,
     angles: FloatArray,
     on: MaskArray,
+    *,
+    shared: bool,
 ) -> Ring | None:
     place = ((angles / (2.0 * math.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
     counts = np.bincount(place[on], minlength=SECTORS)
@@ -128,8 +132,8 @@ def _measured(
     count = int((on & about).sum())
     contrast = count / max(1, count + inside + outside)
     white = _radius_variance(angles[on], deviation)
-    shared = shared_covariance(heights[on], residuals[on], angles[on], radius) if count < 20000 else None
-    variance = white + (0.0 if shared is None else float(shared[4, 4]))
+    common = shared_covariance(heights[on], residuals[on], angles[on], radius) if shared else None
+    variance = white + (0.0 if common is None else float(common[4, 4]))
     scatter = _scatter(residuals[on], heights[on], place[on])
     radius -= min(scatter**2 / (2.0 * radius), 0.3 * radius)
     if not (radius > 0.0 and math.isfinite(variance)):
@@ -162,7 +166,7 @@ def _fit(xy: FloatArray, circle: FloatArray, width: float, floor: float) -> floa
     """Move a circle to the robust least squares with equal weights of the sectors; return the deviation, 0 if none."""
     n = xy.shape[1]
     matrix, right = np.empty((3, 3)), np.empty(3)
-    counts, order = np.zeros(SECTORS), np.zeros(SECTORS)
+    counts, places = np.zeros(SECTORS), np.zeros(n, np.int64)
     deviation = 0.0
     for step in range(STEPS):
         for s in range(SECTORS):
@@ -170,7 +174,8 @@ def _fit(xy: FloatArray, circle: FloatArray, width: float, floor: float) -> floa
         for i in range(n):
             dx, dy = xy[0, i] - circle[0], xy[1, i] - circle[1]
             if abs(math.sqrt(dx * dx + dy * dy) - circle[2]) < width:
-                counts[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * SECTORS) % SECTORS] += 1.0
+                places[i] = int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * SECTORS) % SECTORS
+                counts[places[i]] += 1.0
         filled, total = 0, 0.0
         for s in range(SECTORS):
             if counts[s] > 0.0:
@@ -191,8 +196,7 @@ def _fit(xy: FloatArray, circle: FloatArray, width: float, floor: float) -> floa
             rest = 1.0 - (e / width) ** 2
             if rest <= 0.0:
                 continue
-            sector = int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * SECTORS) % SECTORS
-            weight = rest * rest / max(counts[sector], least)
+            weight = rest * rest / max(counts[places[i]], least)
             u, v = dx / d, dy / d
             matrix[0, 0] += weight * u * u
             matrix[0, 1] += weight * u * v
@@ -217,6 +221,6 @@ def _fit(xy: FloatArray, circle: FloatArray, width: float, floor: float) -> floa
             return 0.0
         deviation = SPREAD * math.sqrt(squares / weights)
         width = max(floor, min(0.9 * width, TUKEY * deviation)) if step < 10 else max(floor, TUKEY * deviation)
-        if size < SETTLED * circle[2] and step > 10:
+        if size < SETTLED * circle[2] and step > 8:
             break
     return deviation
