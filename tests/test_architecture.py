@@ -28,6 +28,7 @@ ONLY_IN = {
     "pandas": {"results"},
     "plyfile": {"io"},
     "pye57": {"io"},
+    "pyproj": {"export", "io"},
     "rich": {"cli"},
     "trimesh": {"export"},
 }
