@@ -134,7 +134,7 @@ def extract(
         jobs = [replace(first, annotated=annotated or first.annotated, rejected=rejected, report=report, picture=png)]
     else:
         jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png, mesh, units)
-    check_meshes([job.mesh for job in jobs if job.mesh is not None], units)
+    check_meshes([job.mesh for job in jobs if job.mesh is not None], units, found)
     summaries = options.summaries(output, [job.scan for job in jobs])
     extras = [*(name for name in [profile] if name is not None), *(job.annotated for job in others if job.annotated)]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])

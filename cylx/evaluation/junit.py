@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 from cylx.evaluation.differences import Difference
 from cylx.evaluation.regression import Comparison
 from cylx.harmless import visible
+from cylx.wording import number
 
 LISTS = ("cylinders", "blends", "fittings", "runs")
 
@@ -79,11 +80,11 @@ def _said(difference: Difference) -> str:
     if difference.kind in {"missing", "extra"}:
         only = ("A", difference.id_a) if difference.kind == "missing" else ("B", difference.id_b)
         radius = difference.a if difference.kind == "missing" else difference.b
-        size = "" if radius is None else f" of radius {radius:.6g}"
+        size = "" if radius is None else f" of radius {number(radius, 6)}"
         return f"{difference.kind}: {difference.what} {only[1]}{size} is only in {only[0]}"
     values = [("A", difference.a), ("B", difference.b), ("difference", difference.difference)]
     values.append(("tolerance", difference.tolerance))
-    told = ", ".join(f"{name} {value:.6g}" for name, value in values if value is not None)
+    told = ", ".join(f"{name} {number(value, 6)}" for name, value in values if value is not None)
     ids = f"id {difference.id_a} in A, {difference.id_b} in B"
     return f"{difference.kind}: {difference.what}{': ' if told else ''}{told} ({ids})"
 

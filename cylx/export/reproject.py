@@ -7,12 +7,40 @@ from typing import Any
 
 import numpy as np
 
-from cylx.errors import OutputError
+from cylx.errors import OutputError, UsageError
 from cylx.optional.extras import is_found, require
 
 _WGS84 = 4326
 _PLACES = 9
 """Decimal places of degrees: a tenth of a millimetre."""
+
+
+def crs_of(text: str, place: str) -> tuple[str | None, int | None]:
+    """Return the WKT and the code of a CRS that a user names.
+
+    Parameters
+    ----------
+    text : str
+        `EPSG:25832`, a WKT, or what else pyproj knows.
+    place : str
+        Name of the option in an error.
+
+    Raises
+    ------
+    UsageError
+        If it is none, or pyproj is not installed.
+    """
+    require("pyproj", place=place)
+    from pyproj import CRS  # noqa: PLC0415  an extra
+    from pyproj.exceptions import ProjError  # noqa: PLC0415  an extra
+
+    try:
+        crs = CRS.from_user_input(text)
+        code = crs.to_epsg() or _level(crs.to_wkt(), None).to_epsg()
+    except ProjError as error:
+        fault = " ".join(str(error).split())[:200]
+        raise UsageError(place, f"is no CRS: {fault}", "give one as EPSG:25832, or its WKT") from None
+    return str(crs.to_wkt()), None if code is None else int(code)
 
 
 def to_degrees(

@@ -25,7 +25,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None = None) -> PointCloud:  # noqa: A002  the natural name
+def read_cloud(
+    path: str | Path,
+    *,
+    format: str | None = None,  # noqa: A002  the natural name
+    scan: int | None = None,
+    units: str | None = None,
+) -> PointCloud:
     """Read a point cloud with all properties of its points.
 
     Parameters
@@ -36,6 +42,8 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
         Its format; by default from the suffix, or else from the content. LAZ is `las`, NPZ is `npy`.
     scan : int, optional
         Number of the scan of an E57 file to read, from 0; by default all.
+    units : {"m", "mm", "cm", "in", "ft", "us-ft"}, optional
+        Unit of its coordinates; by default what the file says, if it does.
 
     Returns
     -------
@@ -61,6 +69,8 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
             table, facts = _read(source, kind, scan)
         except MemoryError:
             raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
+        if units is not None:
+            facts["units"] = units
         origin = Source(_file_name(path), kind, source.sha256, Selection(scan=scan), **facts)
         return _cloud(table, source.place, origin)
 
@@ -126,18 +136,22 @@ def _file_name(path: str | Path) -> str:
 def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], dict[str, Any]]:
     """Read the table of a file, and what else its source says; rarely needed readers are imported late."""
     if kind == "las":
+        from cylx.io.crs import las_source  # noqa: PLC0415  for this alone
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
         from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  for this alone
 
         facts = las_header(source)
         libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
         require(*libraries, place=source.place, needed_by="", error=InputError, imported=False)
-        return read_isolated(source, "las"), {"header": kept_header(source, facts), "doubts": facts.doubts}
+        table = read_isolated(source, "las")
+        return table, las_source(kept_header(source, facts), facts)
     if kind == "e57":
+        from cylx.io.crs import e57_source  # noqa: PLC0415  for this alone
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
 
         require("pye57", place=source.place, needed_by="", error=InputError, imported=False)
-        return read_isolated(source, "e57", scan=scan), {}
+        table = read_isolated(source, "e57", scan=scan)
+        return table, e57_source(source)
     if kind == "npy":
         from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone
 

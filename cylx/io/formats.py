@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc")
 LAS_SUFFIXES = (".las", ".laz")
 FORMATS = ("ply", "pcd", "xyz", "las", "e57", "npy")
+MAY_SAY_UNITS = ("las", "e57", "ptx")
+"""Formats whose files may say the unit of their lengths."""
 _CERTAIN = {
     ".ply": "ply",
     ".pcd": "pcd",
@@ -35,6 +37,11 @@ _HEAD = 1024
 _BOM = b"\xef\xbb\xbf"
 _WIDE_TEXT = (b"\xff\xfe", b"\xfe\xff")
 _ARCHIVES = (".zip", ".xlsx", ".docx", ".ods", ".odt", ".kmz", ".usdz", ".3mf", ".ifczip")
+
+
+def silent_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of files that never say the unit of their lengths."""
+    return (*(suffix for suffix, kind in _CERTAIN.items() if kind not in MAY_SAY_UNITS), *TEXT_SUFFIXES)
 
 
 def cloud_suffix(path: str | Path) -> str:

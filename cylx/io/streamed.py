@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.clouds import read_cloud
+from cylx.io.crs import las_source
 from cylx.io.formats import cloud_name, cloud_suffix, recognise
 from cylx.io.inputs import Input, check_unchanged, printable, sha256_of, stamp_of
 from cylx.io.las import las_parts, libraries_for
@@ -77,7 +78,7 @@ class StreamedCloud:
         raise InputError(printable(self.source.file), "no point has finite coordinates", "export the file again")
 
 
-def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None) -> StreamedCloud:
+def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, units: str | None = None) -> StreamedCloud:
     """Open a cloud to be read piece by piece.
 
     LAS, LAZ, NPY and binary PLY are read from their file. Other formats are read once as a whole, and from then on
@@ -90,6 +91,8 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None) -> S
         Where the copy may be put.
     scan : int, optional
         Number of the scan of an E57 file to read.
+    units : str, optional
+        Unit of its coordinates; by default what the file says.
 
     Returns
     -------
@@ -106,8 +109,13 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None) -> S
             kind = recognise(source, cloud_suffix(path))
             streamed = _STREAMED[kind](source, Path(path)) if kind in _STREAMED else None
         if streamed is not None:
-            return _guarded(streamed, path, stamp, digest)
-    return _spooled(read_cloud(path, scan=scan), spool)
+            return _stated(_guarded(streamed, path, stamp, digest), units)
+    return _spooled(read_cloud(path, scan=scan, units=units), spool)
+
+
+def _stated(cloud: StreamedCloud, units: str | None) -> StreamedCloud:
+    """Return a cloud in units that are given."""
+    return cloud if units is None else replace(cloud, source=replace(cloud.source, units=units))
 
 
 def stream_arrays(pieces: Iterable[ArrayLike], spool: Path) -> StreamedCloud:
@@ -170,7 +178,7 @@ def _source(source: Input, path: Path, kind: str, **facts: Any) -> Source:  # no
 def _stream_las(source: Input, path: Path) -> StreamedCloud:
     facts = las_header(source)
     require(*libraries_for(facts), place=source.place, needed_by="", error=InputError)
-    about = _source(source, path, "las", header=kept_header(source, facts), doubts=facts.doubts)
+    about = _source(source, path, "las", **las_source(kept_header(source, facts), facts))
 
     def parts() -> Iterator[NDArray[np.void]]:
         with _opened(path, source.sha256) as file:
