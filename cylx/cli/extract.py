@@ -115,10 +115,10 @@ def extract(
 ) -> None:
     """Find the cylinders of one or several scans.
 
-    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, a folder of them, a pattern in quotes, or - for standard input.
-    For scan.ply this writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of
-    each point; --report FILE adds a page for the browser. No tuning is needed: spacing, noise and radii are measured in
-    the cloud, whatever its unit. A table of the cylinders goes to standard error.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57, PTX or NPY file, a folder of them, a pattern in quotes, or - for standard
+    input. For scan.ply this writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the
+    cylinder of each point; --report FILE adds a page for the browser. No tuning is needed: spacing, noise and radii are
+    measured in the cloud, whatever its unit. A table of the cylinders goes to standard error.
     """
     from cylx.cli.batch.batch import Batch
     from cylx.cli.batch.run import Run

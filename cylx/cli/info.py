@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
     """Show the contents of a scan, the radii that can be found in it, and likely problems.
 
-    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, or - for standard input. Spacing and noise are measured as 'cylx
-    extract' does, in the unit of the scan; the range of radii and the memory needed follow from them. If only some
-    points are used, all values are for these points. Standard error shows one line for each likely problem.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57, PTX or NPY file, or - for standard input. Spacing and noise are measured as
+    'cylx extract' does, in the unit of the scan; the range of radii and the memory needed follow from them. If only
+    some points are used, all values are for these points. Standard error shows one line for each likely problem.
     """
     from cylx.io import read_cloud
     from cylx.scene import select

@@ -37,11 +37,11 @@ def read_cloud(
     Parameters
     ----------
     path : str or Path
-        A PLY, PCD, text, LAS, LAZ, E57, NPY or NPZ file, optionally packed by gzip, or `-` for standard input.
-    format : {"ply", "pcd", "xyz", "las", "e57", "npy"}, optional
+        A PLY, PCD, text, LAS, LAZ, E57, PTX, NPY or NPZ file, optionally packed by gzip, or `-` for standard input.
+    format : {"ply", "pcd", "xyz", "las", "e57", "npy", "ptx"}, optional
         Its format; by default from the suffix, or else from the content. LAZ is `las`, NPZ is `npy`.
     scan : int, optional
-        Number of the scan of an E57 file to read, from 0; by default all.
+        Number of the scan of an E57 or PTX file to read, from 0; by default all.
     units : {"m", "mm", "cm", "in", "ft", "us-ft"}, optional
         Unit of its coordinates; by default what the file says, if it does.
 
@@ -63,8 +63,8 @@ def read_cloud(
     packed = cloud_name(path) != str(path)
     with open_input(path) as file, unpacked(file, packed=packed) as source:
         kind = format or recognise(source, cloud_suffix(path))
-        if scan is not None and kind != "e57":
-            raise InputError(source.place, "is not E57, so no scan can be chosen", "leave --scan out")
+        if scan is not None and kind not in ("e57", "ptx"):
+            raise InputError(source.place, "is neither E57 nor PTX, so no scan can be chosen", "leave --scan out")
         try:
             table, facts = _read(source, kind, scan)
         except MemoryError:
@@ -82,7 +82,7 @@ def recorded_name(path: str | Path) -> str:
 
 def cloud_suffixes() -> tuple[str, ...]:
     """Return the suffixes, in lower case, of the files in a folder that count as clouds; NPY may hold anything else."""
-    return (".ply", ".pcd", *TEXT_SUFFIXES, *LAS_SUFFIXES, ".e57")
+    return (".ply", ".pcd", *TEXT_SUFFIXES, *LAS_SUFFIXES, ".e57", ".ptx")
 
 
 def write_cloud(
@@ -152,6 +152,10 @@ def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void],
         require("pye57", place=source.place, needed_by="", error=InputError, imported=False)
         table = read_isolated(source, "e57", scan=scan)
         return table, e57_source(source)
+    if kind == "ptx":
+        from cylx.io.ptx import read_ptx  # noqa: PLC0415  for this alone
+
+        return read_ptx(source, scan)
     if kind == "npy":
         from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone
 

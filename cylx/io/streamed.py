@@ -21,6 +21,7 @@ from cylx.io.las_header import kept_header, las_header
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.npy import columns_of, map_npy
 from cylx.io.ply_header import TYPES, Header, read_header
+from cylx.io.ptx import ptx_columns, ptx_facts, ptx_parts, ptx_scans
 from cylx.optional.extras import require
 from cylx.records import PointCloud, Source
 
@@ -81,7 +82,7 @@ class StreamedCloud:
 def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, units: str | None = None) -> StreamedCloud:
     """Open a cloud to be read piece by piece.
 
-    LAS, LAZ, NPY and binary PLY are read from their file. Other formats are read once as a whole, and from then on
+    LAS, LAZ, NPY, PTX and binary PLY are read from their file. Other formats are read once as a whole, and from then on
     from a copy on the disk.
 
     Parameters
@@ -90,7 +91,7 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, unit
     spool : Path
         Where the copy may be put.
     scan : int, optional
-        Number of the scan of an E57 file to read.
+        Number of the scan of an E57 or PTX file to read.
     units : str, optional
         Unit of its coordinates; by default what the file says.
 
@@ -233,10 +234,22 @@ def _ply_rows(header: Header) -> np.dtype[np.void]:
     return np.dtype([(name, order + TYPES[item.type]) for name, item in zip(names, properties, strict=True)])
 
 
+def _stream_ptx(source: Input, path: Path) -> StreamedCloud:
+    scans = ptx_scans(source)
+
+    def parts() -> Iterator[NDArray[np.void]]:
+        with _opened(path, source.sha256) as file:
+            yield from _of_size(ptx_parts(file, scans))
+
+    about = _source(source, path, "ptx", **ptx_facts(scans))
+    return StreamedCloud(about, sum(one.count for one in scans), ptx_columns(scans), parts)
+
+
 _STREAMED: dict[str, Callable[[Input, Path], StreamedCloud | None]] = {
     "las": _stream_las,
     "npy": _stream_npy,
     "ply": _stream_ply,
+    "ptx": _stream_ptx,
 }
 
 

@@ -81,7 +81,7 @@ class Source:
     file : str
         The name as the user gave it, `-` for standard input, `<array>` for an array.
     format : str
-        `ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `array`.
+        `ply`, `pcd`, `xyz`, `las`, `e57`, `npy`, `ptx` or `array`.
     sha256 : str or None
         Digest of the bytes read; None for an array.
     selection : Selection

@@ -71,7 +71,7 @@ class InputFile(Part):
     file: str
     """Name of the file without its folder."""
     format: str
-    """`ply`, `pcd`, `xyz`, `las`, `e57` or `npy`."""
+    """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `ptx`."""
     points: Count
     """Number of points, including those without finite coordinates and those not used."""
     sha256: str | None = None
@@ -84,7 +84,7 @@ class Input(Part):
     file: str
     """Name of the file without its folder; `-` for standard input, `<array>` for an array."""
     format: str
-    """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `array`."""
+    """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy`, `ptx` or `array`."""
     points: Count
     """Number of points, including those without finite coordinates and those not used."""
     sha256: str | None = None

@@ -12,7 +12,7 @@ SEEDS = Path(__file__).parent / "seeds"
 _MEMORY = Path("/dev/shm")
 _SUFFIXES = {
     "xyz": ".xyz", "csv": ".csv", "pts": ".pts", "ply": ".ply", "pcd": ".pcd", "npy": ".npy", "npz": ".npz",
-    "guessed": "",
+    "ptx": ".ptx", "guessed": "",
 }  # fmt: skip
 
 
