@@ -7,7 +7,7 @@ MAY_IMPORT = {
         "version",
     },
     "cli": {
-        "api", "config", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional", "palette",
+        "api", "config", "deviation", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional", "palette",
         "pipeline", "records", "report", "results", "scene", "synthetic", "tiles", "version", "wkt", "wording",
     },
     "api": {
@@ -15,6 +15,7 @@ MAY_IMPORT = {
         "tiles",
     },
     "runs": {"fits", "geometry", "records"},
+    "deviation": {"errors", "geometry", "pipeline", "records", "results", "version"},
     "tiles": {"config", "errors", "geometry", "io", "optional", "pipeline", "records", "scene"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
