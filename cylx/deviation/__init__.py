@@ -5,7 +5,7 @@ points ─ assign ─> those of each design cylinder ─ fit ─> its cylinder �
 
 from __future__ import annotations
 
-from cylx.deviation.measure import Deviation, Measured, measure_deviations
+from cylx.deviation.measure import Deviation, Measured, measure_deviations, shapes_of
 from cylx.deviation.verdict import Check, Tolerances, check_deviation, overall
 
 __all__ = [
@@ -16,4 +16,5 @@ __all__ = [
     "check_deviation",
     "measure_deviations",
     "overall",
+    "shapes_of",
 ]

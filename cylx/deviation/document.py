@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import degrees
 from typing import Annotated, Any, Literal
 
@@ -99,7 +100,7 @@ class PatchValues(Part):
     kind: Literal["dent", "bulge"]
     """Inwards, or outwards."""
     depth: Length
-    """Largest distance of a cell from the shape of the rest."""
+    """Largest distance from the shape of the rest, of a surface smoothed over two cells."""
     depth_sd: Length
     """Its standard deviation."""
     area: Length
@@ -180,16 +181,7 @@ class DeviationEntry(Part):
             difference=None if measured is None else _difference(measured),
             form=None if measured is None else _form(measured),
             patches=[] if measured is None else [PatchValues.of(one, measured) for one in measured.patches],
-            checks=[
-                CheckValues(
-                    of=one.of,
-                    value=one.value,
-                    uncertainty=one.uncertainty,
-                    tolerance=one.tolerance,
-                    verdict=one.verdict,
-                )  # fmt: skip
-                for one in checks
-            ],
+            checks=[CheckValues.model_validate(asdict(one)) for one in checks],
             verdict=overall(checks),
         )
 

@@ -7,6 +7,7 @@ cells, which is what ISO 12180-2 calls a filtered one: of single points, cylindr
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,38 @@ FIRST_EXCHANGE = 100
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Smooth:
+    """A cylinder that may be oval and tapered, and heeds no dents.
+
+    Parameters
+    ----------
+    shape : ndarray of shape (6,) or (8,)
+        Two offsets of the axis, its two tilts, the radius, its change along the axis and, if enough of the section was
+        seen, the second harmonic about it.
+    covariance : ndarray of the same shape, squared
+    off : ndarray of shape (C,)
+        Distance of each cell from it, + is outside.
+    of_cylinder : ndarray of shape (5, 5)
+        Covariance of two offsets of the axis, its two tilts and the radius of a true cylinder, from how the cells
+        scatter about that.
+    """
+
+    shape: FloatArray
+    covariance: FloatArray
+    off: FloatArray
+    of_cylinder: FloatArray
+
+    @property
+    def oval(self) -> bool:
+        """Whether it may be oval."""
+        return len(self.shape) > 6
+
+    def at(self, angles: FloatArray, heights: FloatArray) -> FloatArray:
+        """Return its distance from the cylinder that the cells count from, at places; + is outside."""
+        return np.asarray(_rows(angles, heights, self.oval) @ self.shape)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Form:
     """The form of a surface.
 
@@ -39,10 +72,6 @@ class Form:
         little of the section was seen.
     taper, taper_sd : float
         Change of the diameter per length along the axis, and its standard deviation.
-    off : ndarray of shape (C,)
-        Distance of each cell from a cylinder that may be oval and tapered, and heeds no dents; + is outside.
-    covariance : ndarray of shape (5, 5)
-        Of two offsets of the axis, its two tilts and the radius, from how the cells scatter.
     """
 
     minimum_zone: float
@@ -52,52 +81,74 @@ class Form:
     ovality_sd: float | None
     taper: float
     taper_sd: float
-    off: FloatArray
-    covariance: FloatArray
 
 
-def form_of(cells: Cells, radius: float) -> Form | None:
-    """Measure the form of a surface; None if it has too few cells, or they do not determine a cylinder.
+def smooth_of(cells: Cells) -> Smooth | None:
+    """Fit the shape of a surface without its dents; None if it has too few cells.
+
+    Parameters
+    ----------
+    cells : Cells
+    """
+    if len(cells.cells) < LEAST_CELLS:
+        return None
+    oval = cells.coverage >= HALF_ROUND
+    rows = _rows(cells.angles, cells.heights, oval)
+    shape, covariance, off = _robustly(rows, cells.values)
+    _, own, _ = _robustly(_ways(cells.angles, cells.heights), cells.values)
+    return Smooth(shape, covariance, off, own)
+
+
+def form_of(cells: Cells, radius: float, smooth: Smooth, peaks: FloatArray | None = None) -> Form | None:
+    """Measure the form of a surface; None if its cells do not determine a cylinder.
 
     Parameters
     ----------
     cells : Cells
     radius : float
         Of the cylinder that its values count from.
+    smooth : Smooth
+        Its shape without its dents.
+    peaks : ndarray of shape (k, 3), optional
+        Angle, height and value of the deepest places of its dents, which may be between the middles of cells.
     """
-    if len(cells.cells) < LEAST_CELLS:
+    angles, heights, values = cells.angles, cells.heights, cells.values
+    places = (radius + values)[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
+    axis = _least_squares(places, heights)
+    if axis is None:
         return None
-    places = (radius + cells.values)[:, None] * np.column_stack([np.cos(cells.angles), np.sin(cells.angles)])
-    least_squares = _least_squares(places, cells.heights)
-    if least_squares is None:
-        return None
-    residuals = _distances(least_squares, places, cells.heights)
-    zone = _minimum_zone(least_squares, places, cells.heights)
-    ways = _ways(cells)
-    oval = cells.coverage >= HALF_ROUND
-    rows = np.column_stack(
-        [ways, cells.heights, *((np.cos(2 * cells.angles), np.sin(2 * cells.angles)) if oval else ())]
-    )
-    shape, covariance, off = _robustly(rows, cells.values)
-    _, own, _ = _robustly(ways, cells.values)
-    count = len(cells.cells)
-    noise = 2.0 * float(np.median(cells.sds)) * float(np.sqrt(2.0 * np.log(count)))
+    if peaks is not None and len(peaks):
+        more = (radius + peaks[:, 2])[:, None] * np.column_stack([np.cos(peaks[:, 0]), np.sin(peaks[:, 0])])
+        places, heights = np.vstack([places, more]), np.concatenate([heights, peaks[:, 1]])
+    shape, covariance = smooth.shape, smooth.covariance
+    noise = 2.0 * float(np.median(cells.sds)) * math.sqrt(2.0 * math.log(len(cells.cells)))
     ovality = ovality_sd = None
-    if oval:
+    if smooth.oval:
         size = float(np.hypot(shape[6], shape[7]))
         ovality = 4.0 * size
         way = shape[6:8] / size if size > 0 else np.array([1.0, 0.0])
-        ovality_sd = 4.0 * float(np.sqrt(max(way @ covariance[6:8, 6:8] @ way, 0.0)))
+        ovality_sd = 4.0 * math.sqrt(max(float(way @ covariance[6:8, 6:8] @ way), 0.0))
     return Form(
-        zone, float(np.ptp(residuals)), noise, ovality, ovality_sd,
-        2.0 * float(shape[5]), 2.0 * float(np.sqrt(max(covariance[5, 5], 0.0))), off, own,
-    )  # fmt: skip
+        minimum_zone=_minimum_zone(axis, places, heights),
+        least_squares=float(np.ptp(_distances(axis, places, heights))),
+        noise=noise,
+        ovality=ovality,
+        ovality_sd=ovality_sd,
+        taper=2.0 * float(shape[5]),
+        taper_sd=2.0 * math.sqrt(max(float(covariance[5, 5]), 0.0)),
+    )
 
 
-def _ways(cells: Cells) -> FloatArray:
-    """Return how the value of each cell changes with the axis and the radius of a cylinder, shape (C, 5)."""
-    cosines, sines = np.cos(cells.angles), np.sin(cells.angles)
-    return np.column_stack([cosines, sines, cells.heights * cosines, cells.heights * sines, np.ones(len(cosines))])
+def _rows(angles: FloatArray, heights: FloatArray, oval: bool) -> FloatArray:
+    """Return how distances from an axis change with a cylinder that may be tapered and oval, shape (n, 6 or 8)."""
+    harmonics = [np.cos(2 * angles), np.sin(2 * angles)] if oval else []
+    return np.column_stack([_ways(angles, heights), heights, *harmonics])
+
+
+def _ways(angles: FloatArray, heights: FloatArray) -> FloatArray:
+    """Return how distances from an axis change with the axis and the radius of a cylinder, shape (n, 5)."""
+    cosines, sines = np.cos(angles), np.sin(angles)
+    return np.column_stack([cosines, sines, heights * cosines, heights * sines, np.ones(len(cosines))])
 
 
 def _distances(axis: FloatArray, places: FloatArray, heights: FloatArray) -> FloatArray:
@@ -172,20 +223,23 @@ def _minimum_zone(axis: FloatArray, places: FloatArray, heights: FloatArray) -> 
         width = float(np.ptp(_distances(axis + step, places, heights)))
         if not width < best * (1.0 - 1e-9):
             break
-        axis, best = axis + step, width
+        axis, best = np.asarray(axis + step), width
     return best
 
 
 def _robustly(rows: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Fit linear parameters by Tukey's weights; return them, their covariance, and what is left of the values."""
     sizes = np.linalg.norm(rows, axis=0)
-    scaled = rows / np.where(sizes > 0, sizes, 1.0)
-    weights = np.ones(len(values))
-    shape = np.zeros(rows.shape[1])
-    left, spread = values, 0.0
+    sizes = np.where(sizes > 0, sizes, 1.0)
+    scaled = rows / sizes
+    weights: FloatArray = np.ones(len(values))
+    shape: FloatArray = np.zeros(rows.shape[1])
+    left: FloatArray = values
+    spread = 0.0
     for _ in range(STEPS):
         root = np.sqrt(weights)
-        shape = np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-10)[0]
+        solved = np.linalg.lstsq(scaled * root[:, None], values * root, rcond=1e-10)[0]
+        shape = solved.astype(np.float64)
         left = values - scaled @ shape
         spread = MAD_SPREAD * float(np.median(np.abs(left)))
         if spread == 0.0:

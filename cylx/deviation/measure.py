@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.deviation.assign import WITHIN, assign
-from cylx.deviation.form import Form, form_of
-from cylx.deviation.surface import Cells, Patch, cells_of, patches_of
+from cylx.deviation.form import Form, Smooth, form_of, smooth_of
+from cylx.deviation.surface import Cells, Patch, cells_of, patches_of, sharpened
 from cylx.errors import InputError
 from cylx.geometry.arrays import FloatArray
-from cylx.geometry.cylinder import Cylinder, axis_basis, cylinder_coordinates
+from cylx.geometry.cylinder import Cylinder, axis_basis, cylinder_between, cylinder_coordinates
 from cylx.pipeline.segmented import fit_cylinder
 from cylx.records import CylinderFit
+from cylx.records.designs import Design
 
 MOST_POINTS_TO_FIT = 100_000
 ROUNDS = 2
@@ -145,6 +146,14 @@ def measure_deviations(
     return out, labels, residuals
 
 
+def shapes_of(design: Design, scale: float = 1.0) -> list[Cylinder]:
+    """Return the cylinders of a design, its lengths times a scale."""
+    return [
+        cylinder_between(np.array(one.start) * scale, np.array(one.end) * scale, one.radius * scale)
+        for one in design.cylinders
+    ]
+
+
 def _within_ends(found: CylinderFit | str, design: Cylinder) -> Cylinder | None:
     """Return a cylinder that was found between the ends of its design."""
     if isinstance(found, str):
@@ -180,10 +189,18 @@ def _measure(
     shape = Cylinder(point, shape.direction, shape.radius, max(high - low, 1e-9 * shape.radius))
     residuals = distances - shape.radius
     cells = cells_of(heights - 0.5 * (low + high), angles, residuals, shape.radius, shape.height, side)
-    form = form_of(cells, shape.radius)
+    smooth = smooth_of(cells)
+    patches: list[Patch] = []
+    form = None
+    if smooth is not None:
+        middle = heights - 0.5 * (low + high)
+        off = residuals - smooth.at(angles, middle)
+        rough = patches_of(cells, smooth.off, shape.radius, least)
+        patches = [sharpened(one, cells, middle, angles, off, shape.radius) for one in rough]
+        form = form_of(cells, shape.radius, smooth, _peaks(patches, smooth))
     covariance = np.zeros((5, 5)) if fit.covariance is None else fit.covariance
-    if form is not None:  # the larger: cells also scatter by the form of the surface
-        covariance = max((covariance, form.covariance), key=lambda one: float(np.trace(one)))
+    if smooth is not None:  # the larger: cells also scatter by the form of the surface
+        covariance = max((covariance, smooth.of_cylinder), key=lambda one: float(np.trace(one)))
     rmse = float(np.sqrt(np.mean(residuals**2))) if len(residuals) else 0.0
     whole = CylinderFit(
         shape.moved(origin), len(points), rmse, cells.coverage if len(cells.cells) else fit.coverage, 0, None,
@@ -194,11 +211,19 @@ def _measure(
     # where the axis meets the section of the design in which the middle of what was seen lies
     shift = away - (away @ design.direction) * design.direction
     tilt = math.atan2(float(np.linalg.norm(np.cross(along, shape.direction))), float(along @ shape.direction))
-    patches = () if form is None else tuple(patches_of(cells, form.off, shape.radius, least))
     return Measured(
         whole, float(np.linalg.norm(shift)), _widest(covariance[:2, :2]), shift, tilt, _widest(covariance[2:4, 2:4]),
-        shape.radius - design.radius, math.sqrt(max(float(covariance[4, 4]), 0.0)), cells, form, patches,
+        shape.radius - design.radius, math.sqrt(max(float(covariance[4, 4]), 0.0)), cells, form,
+        tuple(sorted(patches, key=lambda patch: -patch.depth)),
     )  # fmt: skip
+
+
+def _peaks(patches: Sequence[Patch], smooth: Smooth) -> FloatArray:
+    """Return angle, height and value of the deepest place of each patch, shape (k, 3)."""
+    rows = [(*patch.deepest, -patch.depth if patch.kind == "dent" else patch.depth) for patch in patches]
+    peaks = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    peaks[:, 2] += smooth.at(peaks[:, 0], peaks[:, 1])
+    return peaks
 
 
 def _widest(covariance: FloatArray) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,12 @@ CERTAIN = 5.0
 EDGE = 0.5
 """… and goes on to those off by this share of it."""
 LEAST_CELLS = 2
+WINDOW = 1.0
+"""Points within so many cells of the deepest cell tell how deep a patch is."""
+LEAST_TO_SHARPEN = 20
+WORST_CONDITION = 1e8
+TINY = 1e-9
+"""Nothing is off by less than this, in radii: coordinates have no more digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,7 +80,7 @@ class Patch:
     kind : {"dent", "bulge"}
         Inwards or outwards.
     depth : float
-        Largest distance from the shape of the rest, of a cell; scene units, > 0.
+        Largest distance from the shape of the rest; scene units, > 0.
     depth_sd : float
         Its standard deviation.
     area, volume : float
@@ -85,6 +91,8 @@ class Patch:
         Middle, radians about the axis.
     height : float
         Middle, from the middle of the cylinder, scene units.
+    deepest : (float, float)
+        Angle and height of the deepest place.
     """
 
     kind: str
@@ -96,6 +104,7 @@ class Patch:
     along: float
     angle: float
     height: float
+    deepest: tuple[float, float]
 
 
 def cells_of(
@@ -155,7 +164,7 @@ def patches_of(cells: Cells, off: FloatArray, radius: float, least: float) -> li
     if not len(off):
         return []
     spread = MAD_SPREAD * float(np.median(np.abs(off - np.median(off))))
-    certain = np.maximum(CERTAIN * np.maximum(cells.sds, spread), least)
+    certain = np.maximum(CERTAIN * np.maximum(cells.sds, spread), max(least, TINY * radius))
     out = []
     for kind, way in (("dent", -1.0), ("bulge", 1.0)):
         share = way * off / certain
@@ -184,11 +193,57 @@ def _patch(kind: str, cells: Cells, own: IndexArray, off: FloatArray, radius: fl
         cells.length * int(rows.max() - rows.min() + 1),
         float(np.angle(np.exp(1j * angle))),
         float(np.average(cells.heights[own], weights=weights)),
+        (float(cells.angles[deepest]), float(cells.heights[deepest])),
     )
 
 
+def sharpened(
+    patch: Patch, cells: Cells, heights: FloatArray, angles: FloatArray, off: FloatArray, radius: float
+) -> Patch:
+    """Return a patch with the depth of its deepest place, from a quadric through the points about its deepest cell.
+
+    The median of a cell is less deep than the deepest place: that is rarely its middle, and the cell is not small
+    against the dent.
+
+    Parameters
+    ----------
+    patch : Patch
+    cells : Cells
+    heights, angles, off : ndarray of shape (n,)
+        Of the points of the surface: lengths from the middle, radians, distances from the shape of the rest.
+    radius : float
+    """
+    u = radius * np.angle(np.exp(1j * (angles - patch.deepest[0]))) / cells.width
+    v = (heights - patch.deepest[1]) / cells.length
+    near = np.hypot(u, v) <= WINDOW
+    u, v, away = u[near], v[near], off[near] * (-1.0 if patch.kind == "dent" else 1.0)
+    middle = float(np.median(away)) if len(away) else 0.0
+    good = np.abs(away - middle) <= max(np.ptp(away) if cells.noise == 0 else 6.0 * cells.noise + patch.depth, 0.0)
+    u, v, away = u[good], v[good], away[good]
+    if len(away) < LEAST_TO_SHARPEN:
+        return patch
+
+    def rows(u: FloatArray, v: FloatArray) -> FloatArray:
+        return np.column_stack([np.ones_like(u), u, v, u * u, u * v, v * v])
+
+    design = rows(u, v)
+    normal = design.T @ design
+    if np.linalg.cond(normal) > WORST_CONDITION:
+        return patch
+    shape = np.linalg.solve(normal, design.T @ away)
+    steps = np.linspace(-1.0, 1.0, 41)
+    across, along = (one.ravel() for one in np.meshgrid(steps, steps))
+    inside = np.hypot(across, along) <= 1.0
+    tried = rows(across[inside], along[inside])
+    best = tried[int(np.argmax(tried @ shape))]
+    depth_sd = float(cells.noise * np.sqrt(best @ np.linalg.solve(normal, best)))
+    angle = patch.deepest[0] + float(best[1]) * cells.width / radius
+    deepest = (angle, patch.deepest[1] + float(best[2]) * cells.length)
+    return replace(patch, depth=max(float(best @ shape), 0.0), depth_sd=depth_sd, deepest=deepest)
+
+
 def _connected(cells: Cells, chosen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Number the groups of chosen cells that touch, also at corners and where the surface was cut open; -1 for none."""
+    """Label the groups of chosen cells that touch, at corners and across the cut of the surface, too; -1 for none."""
     grid = np.full((cells.rows, cells.columns), -1, np.int64)
     grid.ravel()[cells.cells[chosen]] = np.flatnonzero(chosen)
     labels = np.full(len(chosen), -1, np.int64)

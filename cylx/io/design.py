@@ -5,21 +5,19 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from cylx.errors import InputError, UsageError
-from cylx.harmless import visible
+from cylx.io.design_parts import KEYS, design_cylinder, triple
 from cylx.io.inputs import excerpt, open_input, printable, read_json
 from cylx.optional.extras import require
-from cylx.records.designs import Design, DesignCylinder, Triple
+from cylx.records.designs import Design, DesignCylinder
 from cylx.units import METRES
 
 SUFFIXES = (".json", ".csv", ".step", ".stp", ".ifc")
 _MOST_ROWS = 1 << 20
-_LONGEST_NAME = 200
-_KEYS = "give id or name, start_x to end_z (or axis_point, axis_direction and height) and radius"
 
 
 def read_design(path: str | Path) -> Design:
@@ -64,29 +62,6 @@ def read_design(path: str | Path) -> Design:
     return design
 
 
-def design_cylinder(name: str, start: Iterable[Any], end: Iterable[Any], radius: Any, place: str) -> DesignCylinder:  # noqa: ANN401  from files
-    """Return a cylinder whose numbers were checked.
-
-    Raises
-    ------
-    InputError
-        If a number is not finite, the radius is not > 0, or the ends are one point.
-    """
-    try:
-        first, last = _triple(start), _triple(end)
-        size = float(radius)
-    except (TypeError, ValueError):
-        raise InputError(place, "has an end or a radius that is no number", _KEYS) from None
-    if not (all(map(math.isfinite, (*first, *last, size))) and size > 0.0 and math.dist(first, last) > 0.0):
-        raise InputError(place, "has no length, no radius, or one that is not finite", _KEYS)
-    return DesignCylinder(visible(name)[:_LONGEST_NAME], first, last, size)
-
-
-def _triple(values: Iterable[Any]) -> Triple:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
-
-
 def _from_json(document: Mapping[str, Any], place: str) -> Design:
     entries = document.get("cylinders")
     if not isinstance(entries, list):
@@ -113,13 +88,13 @@ def _of_keys(name: str, entry: Mapping[str, Any], place: str) -> DesignCylinder:
         return design_cylinder(name, entry["start"], entry["end"], radius, place)
     point, way, height = (entry.get(key) for key in ("axis_point", "axis_direction", "height"))
     try:
-        middle, along, half = _triple(point or ()), _triple(way or ()), 0.5 * float(height)  # type: ignore[arg-type]
+        middle, along, half = triple(point or ()), triple(way or ()), 0.5 * float(height)  # type: ignore[arg-type]
         length = math.hypot(*along)
         start, end = (
             tuple(m + side * half * a / length for m, a in zip(middle, along, strict=True)) for side in (-1.0, 1.0)
         )
     except (TypeError, ValueError, ZeroDivisionError, OverflowError):
-        raise InputError(place, "has neither ends nor an axis with a height", _KEYS) from None
+        raise InputError(place, "has neither ends nor an axis with a height", KEYS) from None
     return design_cylinder(name, start, end, radius, place)
 
 
@@ -135,10 +110,10 @@ def _from_csv(path: str | Path, place: str) -> Design:
     try:
         rows = list(csv.reader(io.StringIO(text), delimiter=delimiter, strict=True))
     except csv.Error as error:
-        raise InputError(place, f"is no table: {error}", _KEYS) from None
+        raise InputError(place, f"is no table: {error}", KEYS) from None
     names = [name.strip().lower() for name in rows[0]] if rows else []
     if "radius" not in names and "diameter" not in names:
-        raise InputError(f"{place}:1", f"has no column radius in {excerpt(head)}", _KEYS)
+        raise InputError(f"{place}:1", f"has no column radius in {excerpt(head)}", KEYS)
     if len(rows) > _MOST_ROWS:
         raise InputError(place, f"has {len(rows)} rows", f"give at most {_MOST_ROWS}")
     found = []
@@ -147,7 +122,7 @@ def _from_csv(path: str | Path, place: str) -> Design:
             continue
         here = f"{place}:{line}"
         if len(row) != len(names):
-            raise InputError(here, f"expected {len(names)} columns, found {len(row)}", _KEYS)
+            raise InputError(here, f"expected {len(names)} columns, found {len(row)}", KEYS)
         cells = dict(zip(names, (cell.strip() for cell in row), strict=True))
         entry: dict[str, Any] = {}
         for key in ("start", "end", "axis_point", "axis_direction"):

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.design import design_cylinder
+from cylx.io.design_parts import design_cylinder
 from cylx.io.inputs import open_input, printable
 from cylx.records.designs import Design, DesignCylinder
 from cylx.units import unit_of
@@ -70,8 +70,10 @@ def _map(file: Any, metres: float) -> tuple[Any, float]:  # noqa: ANN401  has no
         return np.eye(4), metres
     one = conversions[0]
     scale = float(one.Scale or 1.0)
-    across, along = float(one.XAxisAbscissa or 1.0), float(one.XAxisOrdinate or 0.0)
-    length = math.hypot(across, along) or 1.0
+    across, along = float(one.XAxisAbscissa or 0.0), float(one.XAxisOrdinate or 0.0)
+    if not across and not along:  # both may be left out
+        across = 1.0
+    length = math.hypot(across, along)
     matrix = np.eye(4)
     matrix[:2, :2] = np.array([[across, -along], [along, across]]) / length
     matrix[:3, :3] *= scale
@@ -99,7 +101,7 @@ def _rods(item: Any, matrix: Any, depth: int) -> Iterator[tuple[Any, Any, float]
     elif item.is_a("IfcSweptDiskSolid"):
         places = _polyline(item.Directrix)
         if len(places) == 2:
-            yield _ends(matrix, *places, item.Radius)
+            yield _ends(matrix, places[0], places[1], item.Radius)
     elif item.is_a("IfcExtrudedAreaSolid") and not item.is_a("IfcExtrudedAreaSolidTapered"):
         profile = item.SweptArea
         way = np.array(item.ExtrudedDirection.DirectionRatios, dtype=float)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.design import design_cylinder
+from cylx.io.design_parts import design_cylinder
 from cylx.io.inputs import open_input, printable
 from cylx.records.designs import Design
 
@@ -65,6 +65,8 @@ def read_step(path: str | Path) -> Design:
     try:
         done = reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone and reader.Transfer(document)
         bodies = list(_bodies(document)) if done else []
+    except (ImportError, AttributeError, TypeError):  # this program and Open CASCADE do not fit
+        raise
     except Exception as error:  # noqa: BLE001  what Open CASCADE raises depends on what it finds in the file
         fault = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(place, f"broken STEP: {fault}", "export the file again") from None
@@ -72,7 +74,7 @@ def read_step(path: str | Path) -> Design:
         raise InputError(place, "broken STEP: Open CASCADE cannot read it", "export the file again")
     found = []
     for name, shape in bodies:
-        rods = _merged([face for face in _faces(shape)])
+        rods = _merged(list(_faces(shape)))
         for number, rod in enumerate(rods):
             called = name if len(rods) == 1 else f"{name} {number}"
             found.append(design_cylinder(called, rod.start, rod.end, rod.radius, f"{place}: {called}"))
@@ -81,12 +83,11 @@ def read_step(path: str | Path) -> Design:
 
 def _bodies(document: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401  OCP has no types
     """Yield name and shape of each part, where its assembly puts it."""
-    from OCP.TDF import TDF_LabelSequence  # noqa: PLC0415  an extra
     from OCP.TopLoc import TopLoc_Location  # noqa: PLC0415  an extra
     from OCP.XCAFDoc import XCAFDoc_DocumentTool  # noqa: PLC0415  an extra
 
     tool = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
-    labels = TDF_LabelSequence()
+    labels = _labels()
     tool.GetFreeShapes(labels)
     for number in range(1, labels.Length() + 1):
         yield from _parts(tool, labels.Value(number), TopLoc_Location(), "", 0)
@@ -94,7 +95,7 @@ def _bodies(document: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401  OCP ha
 
 def _parts(tool: Any, label: Any, location: Any, name: str, depth: int) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
     """Yield name and shape of the parts of a label."""
-    from OCP.TDF import TDF_Label, TDF_LabelSequence  # noqa: PLC0415  an extra
+    from OCP.TDF import TDF_Label  # noqa: PLC0415  an extra
 
     own = _name(label) or name
     if tool.IsReference_s(label):
@@ -104,12 +105,23 @@ def _parts(tool: Any, label: Any, location: Any, name: str, depth: int) -> Itera
         own = _name(referred) or own
         label = referred
     if depth < _DEEPEST and tool.IsAssembly_s(label):
-        inner = TDF_LabelSequence()
+        inner = _labels()
         tool.GetComponents_s(label, inner, False)
         for number in range(1, inner.Length() + 1):
             yield from _parts(tool, inner.Value(number), location, own, depth + 1)
         return
     yield own or "solid", tool.GetShape_s(label).Moved(location)
+
+
+def _labels() -> Any:  # noqa: ANN401  OCP has no types
+    """Return an empty list of labels, which has another name from version 8 on."""
+    try:
+        from OCP.collections import Sequence_TDF_Label  # noqa: PLC0415  an extra
+    except ImportError:
+        from OCP.TDF import TDF_LabelSequence  # noqa: PLC0415  an extra
+
+        return TDF_LabelSequence()
+    return Sequence_TDF_Label()
 
 
 def _name(label: Any) -> str:  # noqa: ANN401  OCP has no types

@@ -259,6 +259,7 @@ function makeSections() {
     ["method", result.method],
     ["cylx", result.cylx_version],
   ]));
+  for (const table of facts.tables ?? []) section(table.title, tableOf(table.heads, table.lines), true);
   const reasons = (stage) => Object.entries(stage.rejected).map(([reason, count]) => `${reason} ${count}`).join(", ");
   section("Stages", tableOf(["stage", "considered", "kept", "rejected"],
     stages.map((stage) => [stage.name, String(stage.considered), String(stage.kept), reasons(stage)])));

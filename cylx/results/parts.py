@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from cylx.harmless import visible
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, Selection, Source, TiledExtraction
+    from cylx.records import Extraction, PointCloud, Selection, Source, TiledExtraction
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[Number, Field(ge=0)]
@@ -131,7 +131,11 @@ class Input(Part):
 
         if isinstance(extraction, TiledExtraction):
             return cls._of_tiled(extraction)
-        cloud = extraction.cloud
+        return cls.of_cloud(extraction.cloud)
+
+    @classmethod
+    def of_cloud(cls, cloud: PointCloud) -> Input:
+        """Describe the points of a cloud."""
         return cls(
             file=_name_of(cloud.source),
             format=cloud.source.format,

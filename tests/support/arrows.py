@@ -7,8 +7,9 @@ MAY_IMPORT = {
         "version",
     },
     "cli": {
-        "api", "config", "deviation", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional", "palette",
-        "pipeline", "records", "report", "results", "scene", "synthetic", "tiles", "version", "wkt", "wording",
+        "api", "config", "deviation", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional",
+        "palette", "pipeline", "records", "report", "results", "scene", "synthetic", "tiles", "units", "version", "wkt",
+        "wording",
     },
     "api": {
         "config", "evaluation", "fits", "geometry", "io", "pipeline", "records", "results", "runs", "scene", "stages",
