@@ -81,9 +81,9 @@ def _from_json(document: Mapping[str, Any], place: str) -> Design:
 
 def _of_keys(name: str, entry: Mapping[str, Any], place: str) -> DesignCylinder:
     """Return the cylinder with the ends, or else with the axis and the height, that a mapping has."""
-    radius = entry.get("radius")
-    if radius is None and isinstance(entry.get("diameter"), int | float):
-        radius = 0.5 * entry["diameter"]
+    radius, diameter = entry.get("radius"), entry.get("diameter")
+    if radius is None and isinstance(diameter, int | float) and abs(diameter) < 1e100:
+        radius = 0.5 * diameter
     if entry.get("start") is not None and entry.get("end") is not None:
         return design_cylinder(name, entry["start"], entry["end"], radius, place)
     point, way, height = (entry.get(key) for key in ("axis_point", "axis_direction", "height"))

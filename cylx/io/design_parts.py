@@ -27,7 +27,7 @@ def design_cylinder(name: str, start: Iterable[Any], end: Iterable[Any], radius:
     try:
         first, last = triple(start), triple(end)
         size = float(radius)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(place, "has an end or a radius that is no number", KEYS) from None
     sizes = (*first, *last, size)
     if not (all(abs(one) < _LARGEST for one in sizes) and size > _SMALLEST and math.dist(first, last) > _SMALLEST):
