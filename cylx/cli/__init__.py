@@ -23,6 +23,7 @@ from cylx.version import __version__
         "synth": "cylx.cli.synth",
         "evaluate": "cylx.cli.evaluate",
         "diff": "cylx.cli.diff",
+        "deviation": "cylx.cli.deviation",
         "export": "cylx.cli.export",
         "doctor": "cylx.cli.doctor",
         "warmup": "cylx.cli.warmup",

@@ -34,6 +34,7 @@ LIBRARIES = {
     "ifcopenshell": Library("ifc", "export of IFC"),
     "ezdxf": Library("dxf", "export of DXF"),
     "distributed": Library("dask", "clusters"),
+    "pyproj": Library("crs", "coordinate reference systems"),
     "pandas": Library("dataframe", "data frames"),
 }
 """Optional libraries by import name."""
