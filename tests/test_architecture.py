@@ -16,6 +16,7 @@ OWN_SECTION = {
     "patches": "CandidatesConfig",
 }  # the others are called after their file
 ONLY_IN = {
+    "CSF": {"stems"},
     "OCP": {"export", "io"},
     "click": {"cli"},
     "ezdxf": {"export"},

@@ -17,6 +17,7 @@ from cylx.version import __version__
     homes={
         "extract": "cylx.cli.extract",
         "runs": "cylx.cli.runs",
+        "stems": "cylx.cli.stems",
         "view": "cylx.cli.view",
         "info": "cylx.cli.info",
         "config": "cylx.cli.config",

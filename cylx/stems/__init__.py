@@ -66,9 +66,7 @@ def find_stems(
     stems = _measured(axes, columns, terrain, min_dbh)
     labels = label_stems(stems, columns)
     counts = np.bincount(labels[labels >= 0], minlength=len(stems))
-    out = tuple(
-        _in_scene(replace(stem, points=int(n)), origin, unit) for stem, n in zip(stems, counts, strict=True)
-    )
+    out = tuple(_in_scene(replace(stem, points=int(n)), origin, unit) for stem, n in zip(stems, counts, strict=True))
     return StemPlot(cloud, out, labels, _ground_in_scene(terrain, origin), unit)
 
 

@@ -143,7 +143,7 @@ def _distinct(axes: FloatArray) -> FloatArray:
     cells: dict[tuple[int, int], list[int]] = {}
     for axis in axes:
         middle = axis[:2] + axis[2:4] * 0.5 * (axis[6] + axis[7])
-        i, j = int(math.floor(middle[0])), int(math.floor(middle[1]))
+        i, j = math.floor(middle[0]), math.floor(middle[1])
         rivals = [k for a in (-1, 0, 1) for b in (-1, 0, 1) for k in cells.get((i + a, j + b), ())]
         if not any(_same(axis, kept[k]) for k in rivals):
             cells.setdefault((i, j), []).append(len(kept))

@@ -1,4 +1,4 @@
-"""A cloth laid over the upturned cloud: the ground filter of Zhang et al. (Remote Sensing 8, 2016), by its own library."""
+"""A cloth over the upturned cloud: the ground filter of Zhang et al. (Remote Sensing 8, 2016), by its own library."""
 
 from __future__ import annotations
 

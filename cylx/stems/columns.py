@@ -62,7 +62,7 @@ def _number_cells(points: FloatArray, corner: IndexArray, shape: IndexArray, fla
     for i in range(len(points)):
         number = 0
         for d in range(3):
-            number = number * shape[d] + int(math.floor(points[i, d] / SIDE)) - corner[d]
+            number = number * shape[d] + math.floor(points[i, d] / SIDE) - corner[d]
         flat[i] = number
 
 

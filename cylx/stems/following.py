@@ -43,7 +43,13 @@ class Stretch:
         self._columns, self._ground = columns, ground
 
     def section(
-        self, center: FloatArray, direction: FloatArray, radius: float, *, half: float = HALF, drift: float = 0.35,
+        self,
+        center: FloatArray,
+        direction: FloatArray,
+        radius: float,
+        *,
+        half: float = HALF,
+        drift: float = 0.35,
         shared: bool = False,
     ) -> Section | None:
         """Return the section of a stem about a place (3,) on its axis, None if it is not there."""

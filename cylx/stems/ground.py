@@ -75,7 +75,9 @@ def find_ground(points: FloatArray, classes: NDArray[Any] | None, by: GroundBy) 
     return Ground(corner, CELL, heights, by)
 
 
-def _lowest(points: FloatArray, corner: FloatArray, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _lowest(
+    points: FloatArray, corner: FloatArray, shape: tuple[int, ...]
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the height of the lowest point of each cell, NaN if there is none, and its place within the cell."""
     cells = np.floor((points[:, :2] - corner) / CELL).astype(np.int64)
     np.clip(cells, 0, np.array(shape) - 1, out=cells)
@@ -112,9 +114,7 @@ def _neighbours(z: FloatArray, reach: int) -> FloatArray:
     """Return the values of all cells about each, without its own; NaN beyond the edge."""
     wide = np.pad(z, reach, constant_values=math.nan)
     span = range(2 * reach + 1)
-    views = [
-        wide[i : i + z.shape[0], j : j + z.shape[1]] for i in span for j in span if (i, j) != (reach, reach)
-    ]
+    views = [wide[i : i + z.shape[0], j : j + z.shape[1]] for i in span for j in span if (i, j) != (reach, reach)]
     return np.stack(views)
 
 

@@ -25,7 +25,8 @@ def label_stems(stems: Sequence[Stem], columns: Columns) -> NDArray[np.int32]:
     for k, stem in enumerate(stems):
         centers = np.stack([one.center for one in stem.sections])
         reach = max(one.diameter for one in stem.sections)
-        bottom, top = centers.min(axis=0) - [reach, reach, BEYOND], centers.max(axis=0) + [reach, reach, BEYOND]
+        margin = np.array([reach, reach, BEYOND])
+        bottom, top = centers.min(axis=0) - margin, centers.max(axis=0) + margin
         indices = columns.within(bottom, top)
         points = columns.points[indices]
         z = centers[:, 2]

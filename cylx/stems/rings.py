@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cylx.fits.correlated_error import shared_covariance
-from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.kernels import njit
 from cylx.geometry.numerics import solve_in_place
 
@@ -150,7 +150,7 @@ def _radius_variance(angles: FloatArray, deviation: float) -> float:
     return float(deviation**2 * inverse[2, 2])
 
 
-def _scatter(residuals: FloatArray, heights: FloatArray, place: np.ndarray) -> float:  # type: ignore[type-arg]
+def _scatter(residuals: FloatArray, heights: FloatArray, place: IndexArray) -> float:
     """Return the deviation of points about those beside them: noise, without the form of the bark."""
     cell = place * 64 + np.clip(((heights - heights.min()) / 0.1).astype(np.int64), 0, 63)
     _, inverse, counts = np.unique(cell, return_inverse=True, return_counts=True)

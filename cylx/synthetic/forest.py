@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 
 BREAST_HEIGHT = 1.3
 HARMONICS = 12
@@ -118,9 +118,11 @@ def forest(
         at_breast = np.abs(seen[:, 2] - BREAST_HEIGHT) < 0.3
         sectors = np.unique(((angles[at_breast] + math.pi) / (2.0 * math.pi) * 72).astype(np.int64))
         arc = len(sectors) / 72 * 2.0 * math.pi
-        stems.append(TrueStem(*map(float, tree.foot), height, tree.dbh, tree.lean, tree.height, arc))
-        parts.append((seen + [0.0, 0.0, height], k))
-        parts.extend((piece + [0.0, 0.0, height], CLUTTER) for piece in tree.crown(rng, mobile))
+        x, y = map(float, tree.foot)
+        stems.append(TrueStem(x, y, height, tree.dbh, tree.lean, tree.height, arc))
+        lift = np.array([0.0, 0.0, height])
+        parts.append((seen + lift, k))
+        parts.extend((piece + lift, CLUTTER) for piece in tree.crown(rng, mobile))
     for shrub in _scattered(rng, side, shrubs_per_hectare * side * side / 1e4, 0.2):
         parts.append((_shrub(rng, shrub, ground, mobile), CLUTTER))
     parts.append((_floor(rng, side, ground, mobile), GROUND))
@@ -255,7 +257,7 @@ def _seen_of(
     return np.concatenate(places), np.concatenate(turns)
 
 
-def _hidden(places: FloatArray, eye: FloatArray, discs: FloatArray) -> np.ndarray:  # type: ignore[type-arg]
+def _hidden(places: FloatArray, eye: FloatArray, discs: FloatArray) -> MaskArray:
     """Return which places (n, 2) are behind a disc, seen from an eye."""
     out = np.zeros(len(places), dtype=np.bool_)
     rays = places - eye
@@ -278,7 +280,7 @@ def _shrub(rng: np.random.Generator, foot: FloatArray, ground: _Terrain, mobile:
         t = rng.uniform(0.0, 1.0, 40 if mobile else 160)
         parts.append(t[:, None] * tip + rng.normal(0.0, 0.01, (len(t), 3)))
         parts.append(tip * rng.uniform(0.6, 1.0) + rng.normal(0.0, 0.08, (20 if mobile else 80, 3)))
-    return np.concatenate(parts) + [*foot, z0]
+    return np.asarray(np.concatenate(parts) + np.array([*foot, z0]))
 
 
 def _floor(rng: np.random.Generator, side: float, ground: _Terrain, mobile: bool) -> FloatArray:

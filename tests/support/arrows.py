@@ -8,8 +8,8 @@ MAY_IMPORT = {
     },
     "cli": {
         "api", "config", "deviation", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional",
-        "palette", "pipeline", "records", "report", "results", "scene", "synthetic", "tiles", "units", "version", "wkt",
-        "wording",
+        "palette", "pipeline", "records", "report", "results", "scene", "stems", "synthetic", "tiles", "units",
+        "version", "wkt", "wording",
     },
     "api": {
         "config", "evaluation", "fits", "geometry", "io", "pipeline", "records", "results", "runs", "scene", "stages",
@@ -17,6 +17,7 @@ MAY_IMPORT = {
     },
     "runs": {"fits", "geometry", "records"},
     "deviation": {"errors", "geometry", "pipeline", "records", "results", "version"},
+    "stems": {"fits", "geometry", "optional", "records"},
     "tiles": {"config", "errors", "geometry", "io", "optional", "pipeline", "records", "scene"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},
     "pipeline": {
