@@ -169,7 +169,7 @@ def _fit(xy: FloatArray, circle: FloatArray, width: float, floor: float) -> floa
     counts, places = np.zeros(SECTORS), np.zeros(n, np.int64)
     deviation = 0.0
     for step in range(STEPS):
-        counts[:] = 0.0
+        counts.fill(0.0)
         for i in range(n):
             dx, dy = xy[0, i] - circle[0], xy[1, i] - circle[1]
             if abs(math.sqrt(dx * dx + dy * dy) - circle[2]) < width:

@@ -91,7 +91,8 @@ def main():
     e, z = np.array(errors), np.array(spread)
     print(
         f"{args.scanner}: found {counts[0]} of {counts[0] + counts[1]}, false {counts[2]}, "
-        f"bias {100 * e.mean():.2f} %, rmse {100 * math.sqrt((e**2).mean()):.2f} %, largest {100 * np.abs(e).max():.1f} %, "
+        f"bias {100 * e.mean():.2f} %, rmse {100 * math.sqrt((e**2).mean()):.2f} %, "
+        f"largest {100 * np.abs(e).max():.1f} %, "
         f"within two standard deviations {100 * (np.abs(z) < 2).mean():.0f} %"
     )
 
