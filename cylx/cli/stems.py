@@ -176,7 +176,7 @@ def _show(cloud: PointCloud, content: Stems, written: list[str]) -> None:
 def _row(stem: ResultStem) -> list[Any]:
     return [
         str(stem.id), f"{stem.x:.2f}", f"{stem.y:.2f}", f"{stem.ground:.2f}",
-        f"{100 * stem.dbh:.1f} ± {100 * stem.dbh_sd:.1f}", f"{stem.lean_deg:.1f}°",
+        f"{100 * stem.dbh:.1f} ± {100 * stem.dbh_sd:.2f}", f"{stem.lean_deg:.1f}°",
         f"{stem.lowest:.1f} to {stem.highest:.1f} m", f"{stem.arc_deg:.0f}°", f"{stem.quality:.2f}",
         "; ".join(stem.flags),
     ]  # fmt: skip

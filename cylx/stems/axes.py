@@ -139,20 +139,26 @@ def _best_lines(circles: FloatArray, layers: IndexArray, keys: IndexArray, count
 
 def _distinct(axes: FloatArray) -> FloatArray:
     """Leave out axes that are nearly the same as a better one: as thick, and with their middles within each other."""
-    kept: list[FloatArray] = []
-    cells: dict[tuple[int, int], list[int]] = {}
-    for axis in axes:
-        middle = axis[:2] + axis[2:4] * 0.5 * (axis[6] + axis[7])
-        i, j = math.floor(middle[0]), math.floor(middle[1])
-        rivals = [k for a in (-1, 0, 1) for b in (-1, 0, 1) for k in cells.get((i + a, j + b), ())]
-        if not any(_same(axis, kept[k]) for k in rivals):
-            cells.setdefault((i, j), []).append(len(kept))
-            kept.append(axis)
-    return np.array(kept).reshape(-1, 8)
+    middles = axes[:, :2] + axes[:, 2:4] * (0.5 * (axes[:, 6] + axes[:, 7]))[:, None]
+    keys = _cells_of(middles)
+    order = np.argsort(keys, kind="stable")
+    kept = np.ones(len(axes), np.bool_)
+    _drop_same(axes, keys, keys[order], order, kept)
+    return axes[kept]
 
 
-def _same(axis: FloatArray, better: FloatArray) -> bool:
-    height = 0.5 * (axis[6] + axis[7])
-    away = axis[:2] - better[:2] + height * (axis[2:4] - better[2:4])
-    factor = axis[4] / better[4]
-    return bool(math.hypot(*away) < 0.5 * max(axis[4], better[4]) and 1.0 / 1.5 < factor < 1.5)
+@njit(cache=True, nogil=True)
+def _drop_same(axes: FloatArray, keys: IndexArray, by_cell: IndexArray, order: IndexArray, kept: MaskArray) -> None:
+    for i in range(len(axes)):
+        height = 0.5 * (axes[i, 6] + axes[i, 7])
+        for row in range(-1, 2):
+            middle = keys[i] + (row << 32)
+            for k in range(np.searchsorted(by_cell, middle - 1), np.searchsorted(by_cell, middle + 2)):
+                j = order[k]
+                if j >= i or not kept[j]:
+                    continue
+                x = axes[i, 0] - axes[j, 0] + height * (axes[i, 2] - axes[j, 2])
+                y = axes[i, 1] - axes[j, 1] + height * (axes[i, 3] - axes[j, 3])
+                factor = axes[i, 4] / axes[j, 4]
+                if math.hypot(x, y) < 0.5 * max(axes[i, 4], axes[j, 4]) and 1.0 / 1.5 < factor < 1.5:
+                    kept[i] = False
