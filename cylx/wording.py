@@ -1,4 +1,4 @@
-"""Counts in words: the same in messages, reports and what is shown of a result."""
+"""Counts and numbers in words: the same in messages, reports and what is shown of a result."""
 
 from __future__ import annotations
 
@@ -43,3 +43,16 @@ def piping_counted(runs: int, kinds: Sequence[str]) -> str:
     """
     said = f"{runs} run{'' if runs == 1 else 's'}"
     return f"{said} with {fittings_counted(kinds)}" if kinds else f"{said} without fittings"
+
+
+def number(value: float, digits: int) -> str:
+    """Return a number with this many digits or, if it has more before its point, with all of those: no powers of ten.
+
+    Very large and very small numbers keep their powers.
+
+    Examples
+    --------
+    >>> number(0.123456, 4), number(12345.6, 4), number(4512345.0, 6), number(1.5e-7, 4), number(3e20, 4)
+    ('0.1235', '12346', '4512345', '1.5e-07', '3e+20')
+    """
+    return f"{value:.0f}" if 10.0**digits - 0.5 <= abs(value) < 1e15 else f"{value:.{digits}g}"

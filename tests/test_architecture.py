@@ -16,10 +16,11 @@ OWN_SECTION = {
     "patches": "CandidatesConfig",
 }  # the others are called after their file
 ONLY_IN = {
-    "OCP": {"export"},
+    "CSF": {"stems"},
+    "OCP": {"export", "io"},
     "click": {"cli"},
     "ezdxf": {"export"},
-    "ifcopenshell": {"export"},
+    "ifcopenshell": {"export", "io"},
     "laspy": {"io"},
     "lazrs": {"io"},
     "matplotlib": {"experiments", "optional", "report"},  # but for types in optional alone
@@ -28,6 +29,7 @@ ONLY_IN = {
     "pandas": {"results"},
     "plyfile": {"io"},
     "pye57": {"io"},
+    "pyproj": {"export", "io"},
     "rich": {"cli"},
     "trimesh": {"export"},
 }

@@ -98,7 +98,7 @@ def extract(
     classes : sequence of int, optional
         Use only points of these classes; for files that have classes, as LAS and LAZ do.
     scan : int, optional
-        Number of the scan of an E57 file to read, from 0; by default all.
+        Number of the scan of an E57 or PTX file to read, from 0; by default all.
     threads : int, optional
         Number of threads; the result does not depend on it. By default one per core.
     observer : Observer, optional

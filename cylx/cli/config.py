@@ -107,15 +107,29 @@ def _faults_of(failure: ConfigError, file: str) -> list[dict[str, object]]:
 @config.command(examples=["cylx config schema > cylx.schema.json", "cylx config schema --result"])
 @click.option("--result", is_flag=True, help="Print the schema of NAME.cylinders.json instead.")
 @click.option("--rejected", is_flag=True, help="Print the schema of the file of 'cylx extract --rejected' instead.")
+@click.option("--deviation", is_flag=True, help="Print the schema of the JSON of 'cylx deviation' instead.")
+@click.option("--stems", is_flag=True, help="Print the schema of the JSON of 'cylx stems' instead.")
 @debug_option
-def schema(*, result: bool, rejected: bool) -> None:
+def schema(*, result: bool, rejected: bool, deviation: bool, stems: bool) -> None:
     """Print the JSON schema of the configuration, or of the output files.
 
     With the schema, editors complete and check the YAML while you type.
     """
     if result and rejected:
         raise UsageError("--rejected", "contradicts --result", "leave one of them out")
-    if rejected:
+    if deviation and (result or rejected):
+        raise UsageError("--deviation", "contradicts --result and --rejected", "leave one of them out")
+    if stems and (result or rejected or deviation):
+        raise UsageError("--stems", "contradicts the other schemas", "leave one of them out")
+    if stems:
+        from cylx.results.stems import stems_schema
+
+        document = stems_schema()
+    elif deviation:
+        from cylx.deviation.document import deviation_schema
+
+        document = deviation_schema()
+    elif rejected:
         from cylx.results import rejections_schema
 
         document = rejections_schema()

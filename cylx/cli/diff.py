@@ -14,7 +14,7 @@ from cylx.cli.terminal.failures import answer, called_by_file
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import UsageError
 from cylx.io.outputs import STANDARD_OUTPUT, check_writable, write_bytes
-from cylx.wording import counted
+from cylx.wording import counted, number
 
 if TYPE_CHECKING:
     from cylx.evaluation import Comparison, Difference
@@ -100,4 +100,4 @@ def _row(difference: Difference) -> list[str]:
     prefix = "" if difference.of == "cylinders" else f"{difference.of.removesuffix('s')} "
     ids = ["" if number is None else f"{prefix}{number}" for number in (difference.id_a, difference.id_b)]
     values = (difference.a, difference.b, difference.difference, difference.tolerance)
-    return [difference.kind, *ids, difference.what, *("" if v is None else f"{v:.6g}" for v in values)]
+    return [difference.kind, *ids, difference.what, *("" if v is None else number(v, 6) for v in values)]

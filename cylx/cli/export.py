@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from cylx.export import Drawing, Exported
+    from cylx.export.geo import MapCrs
     from cylx.results import ResultCylinder
+    from cylx.results.parts import InputCrs
 
 
 @click.command(
@@ -37,6 +39,9 @@ if TYPE_CHECKING:
 @click.argument("outputs", metavar="OUT...", nargs=-1, required=True, shell_complete=complete_files)
 @units_option(".glb, .step, .ifc, .dxf and .pcf need")
 @click.option(
+    "--crs", "crs_text", metavar="TEXT", help="Coordinate reference system, if RESULT has none: EPSG:25832, or a WKT."
+)
+@click.option(
     "--min-confidence", type=NumberRange(0, 1), metavar="X", help="Leave out less certain cylinders and fittings."
 )
 @overwrite_option
@@ -47,6 +52,7 @@ def export(
     result: str,
     outputs: tuple[str, ...],
     units: str | None,
+    crs_text: str | None,
     min_confidence: float | None,
     overwrite: bool,
     as_json: bool,
@@ -54,19 +60,20 @@ def export(
     """Write the cylinders of RESULT for other programs.
 
     The suffix of each OUT selects the format: .ply, .obj, .glb and .stl are meshes, .csv is a table, .step and .stp are
-    exact solids, .ifc has pipe segments, .dxf centre lines, and .pcf piping components. If RESULT has fittings, as
-    those of 'cylx runs', they are written too, and cylinders end where a fitting begins; the table stays as it is. All
-    but .csv and .pcf need an extra, such as 'cylx[mesh]'.
+    exact solids, .ifc has pipe segments, .dxf centre lines, .pcf piping components, and .gpkg and .geojson are maps of
+    centre lines. If RESULT has fittings, as those of 'cylx runs', they are written too, and cylinders end where a
+    fitting begins; the table stays as it is. All but .csv, .pcf and .gpkg need an extra, such as 'cylx[mesh]'.
     """
     from cylx.export import format_of, render
     from cylx.io import check_writable
 
     formats = {name: format_of(name) for name in outputs}
     check_apart([result], outputs)
-    for name, known in formats.items():
-        known.demand(name, units)
+    for name in formats:
         check_writable(name, overwrite=overwrite)
-    drawing = _draw(result, units, min_confidence)
+    drawing = _draw(result, units, crs_text, min_confidence)
+    for name, known in formats.items():
+        known.demand(name, drawing.unit)
     written = {name: render(drawing, known, name) for name, known in formats.items()}
     write_together({name: exported.data for name, exported in written.items()}, overwrite=overwrite)
     _report(result, drawing, written)
@@ -82,6 +89,7 @@ def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[s
         **({} if drawing.piping is None else {"fittings": drawing.piping.fittings}),
         "flat": drawing.flat,
         "units": drawing.unit,
+        **({} if drawing.crs is None else {"crs": drawing.crs.name}),
         "files": [
             {"file": legible(name), "bytes": len(exported.data), "offset": exported.offset}
             for name, exported in written.items()
@@ -89,7 +97,7 @@ def _told(result: str, drawing: Drawing, written: dict[str, Exported]) -> dict[s
     }
 
 
-def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing:
+def _draw(path: str, units: str | None, crs: str | None, min_confidence: float | None) -> Drawing:
     """Read a result and choose the cylinders to draw."""
     from cylx.io import read_json
     from cylx.results import Result
@@ -99,7 +107,26 @@ def _draw(path: str, units: str | None, min_confidence: float | None) -> Drawing
     if min_confidence is not None:
         chosen = _sure(path, chosen, min_confidence)
         fittings = [fitting for fitting in fittings if fitting.confidence >= min_confidence]
-    return drawing_of(chosen, units, path, fittings, content.runs or [])
+    system = map_crs(content.input.crs, crs)
+    return drawing_of(chosen, units or content.input.units, path, fittings, content.runs or [], system)
+
+
+def map_crs(found: InputCrs | None, given: str | None) -> MapCrs | None:
+    """Return the CRS that is given, or else that of a result; None if there is none."""
+    from cylx.export.geo import MapCrs
+    from cylx.wkt import facts_of
+
+    wkt, epsg = (None, None) if found is None else (found.wkt, found.epsg)
+    if given is not None:
+        from cylx.export.reproject import crs_of
+
+        wkt, epsg = crs_of(given, "--crs")
+    if wkt is None and epsg is None:
+        return None
+    facts = None if wkt is None else facts_of(wkt)
+    name = facts.name if facts is not None else f"EPSG:{epsg}" if found is None else found.name
+    metres = 1.0 if facts is None or facts.metres is None else facts.metres
+    return MapCrs(wkt, epsg, name, metres)
 
 
 def _sure(path: str, cylinders: Sequence[ResultCylinder], least: float) -> list[ResultCylinder]:

@@ -115,10 +115,10 @@ def extract(
 ) -> None:
     """Find the cylinders of one or several scans.
 
-    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, a folder of them, a pattern in quotes, or - for standard input.
-    For scan.ply this writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the cylinder of
-    each point; --report FILE adds a page for the browser. No tuning is needed: spacing, noise and radii are measured in
-    the cloud, whatever its unit. A table of the cylinders goes to standard error.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57, PTX or NPY file, a folder of them, a pattern in quotes, or - for standard
+    input. For scan.ply this writes scan.cylinders.json, the cylinders, and scan.annotated.ply, the cloud with the
+    cylinder of each point; --report FILE adds a page for the browser. No tuning is needed: spacing, noise and radii are
+    measured in the cloud, whatever its unit. A table of the cylinders goes to standard error.
     """
     from cylx.cli.batch.batch import Batch
     from cylx.cli.batch.run import Run
@@ -134,7 +134,7 @@ def extract(
         jobs = [replace(first, annotated=annotated or first.annotated, rejected=rejected, report=report, picture=png)]
     else:
         jobs = plan_jobs(found, output, annotate, annotated, rejected, report, png, mesh, units)
-    check_meshes([job.mesh for job in jobs if job.mesh is not None], units)
+    check_meshes([job.mesh for job in jobs if job.mesh is not None], units, found)
     summaries = options.summaries(output, [job.scan for job in jobs])
     extras = [*(name for name in [profile] if name is not None), *(job.annotated for job in others if job.annotated)]
     check_apart(found, [*(name for job in jobs for name in job.outputs), *extras, *summaries])

@@ -14,6 +14,7 @@ from cylx.cli.options.selection import selecting
 from cylx.cli.terminal.failures import answer, tell
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import InputError
+from cylx.wording import number
 
 if TYPE_CHECKING:
     from cylx.records import PointCloud, Selection
@@ -31,9 +32,9 @@ if TYPE_CHECKING:
 def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
     """Show the contents of a scan, the radii that can be found in it, and likely problems.
 
-    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57 or NPY file, or - for standard input. Spacing and noise are measured as 'cylx
-    extract' does, in the unit of the scan; the range of radii and the memory needed follow from them. If only some
-    points are used, all values are for these points. Standard error shows one line for each likely problem.
+    SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57, PTX or NPY file, or - for standard input. Spacing and noise are measured as
+    'cylx extract' does, in the unit of the scan; the range of radii and the memory needed follow from them. If only
+    some points are used, all values are for these points. Standard error shows one line for each likely problem.
     """
     from cylx.io import read_cloud
     from cylx.scene import select
@@ -119,6 +120,10 @@ def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
         "finite": len(whole.points),
         "fields": fields,
     }
+    if cloud.source.units is not None:
+        facts["units"] = cloud.source.units
+    if cloud.source.crs is not None:
+        facts["crs"] = {key: value for key, value in asdict(cloud.source.crs).items() if value is not None}
     if cloud is not whole:
         facts["selected"] = len(cloud.points)
     facts["extract_memory_bytes"] = memory_for(cloud.rows if cloud is whole else len(cloud.points))
@@ -139,20 +144,29 @@ def as_text(facts: dict[str, Any]) -> str:
         **({"selected": str(facts["selected"])} if "selected" in facts else {}),
         "fields": ", ".join(f"{field['name']} ({field['type']})" for field in facts["fields"]),
     }
+    if "units" in facts:
+        lines["units"] = facts["units"]
+    if "crs" in facts:
+        code = f", EPSG:{facts['crs']['epsg']}" if "epsg" in facts["crs"] else ""
+        lines["crs"] = facts["crs"]["name"] + ("" if code[2:] == facts["crs"]["name"] else code)
     if "bounds" in facts:
         lines["min"] = _vector(facts["bounds"]["min"])
         lines["max"] = _vector(facts["bounds"]["max"])
         lines["size"] = _vector(facts["size"])
-        lines["extent"] = f"{facts['extent']:.6g}"
+        lines["extent"] = number(facts["extent"], 6)
     if "scene" in facts:
-        lines["spacing"] = f"{facts['scene']['spacing']:.4g}"
-        lines["noise"] = f"{facts['scene']['noise']:.4g}"
+        lines["spacing"] = number(facts["scene"]["spacing"], 4)
+        lines["noise"] = number(facts["scene"]["noise"], 4)
         radius = facts["radius"]
-        lines["radii"] = f"{radius['min']:.4g} to {radius['max']:.4g}, usually found from {radius['found_from']:.4g}"
+        lines["radii"] = "{} to {}, usually found from {}".format(
+            *(number(radius[name], 4) for name in ("min", "max", "found_from"))
+        )
     lines["memory"] = f"{facts['extract_memory_bytes'] / 1e9:.2g} GB for cylx extract"
     return "".join(f"{name:<8} {value}\n" for name, value in lines.items())
 
 
 def _vector(values: list[float]) -> str:
     """Format three coordinates."""
-    return " ".join(f"{value:.10g}" for value in values)
+    return " ".join(
+        number(value, 10) if abs(value) < 1e5 else f"{value:.4f}".rstrip("0").rstrip(".") for value in values
+    )

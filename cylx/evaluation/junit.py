@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 from xml.etree import ElementTree
@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 from cylx.evaluation.differences import Difference
 from cylx.evaluation.regression import Comparison
 from cylx.harmless import visible
+from cylx.wording import number
 
 LISTS = ("cylinders", "blends", "fittings", "runs")
 
@@ -36,23 +37,46 @@ def junit(a: Mapping[str, Any], b: Mapping[str, Any], comparison: Comparison, na
     bytes
         XML in UTF-8.
     """
-    cases = [*_cases(a, comparison)]
-    failures = sum(bool(differences) for *_, differences in cases)
+    cases = [
+        (of, title, differences[0].kind if differences else "", [_said(one) for one in differences])
+        for of, title, differences in _cases(a, comparison)
+    ]
+    return junit_of("cylx diff", f"{names[0]} and {names[1]}", names[0], cases)
+
+
+def junit_of(tool: str, title: str, path: str, cases: Sequence[tuple[str, str, str, Sequence[str]]]) -> bytes:
+    """Return tests as a JUnit file, with one suite.
+
+    Parameters
+    ----------
+    tool : str
+        What made them.
+    title : str
+        Name of the suite.
+    path : str
+        What groups the tests on a server.
+    cases : sequence of (str, str, str, sequence of str)
+        Of each test its group, its name, the type of its failure, and what is wrong; it fails if that is something.
+
+    Returns
+    -------
+    bytes
+        XML in UTF-8.
+    """
+    failures = sum(bool(wrong) for *_, wrong in cases)
     counts = {"tests": str(len(cases)), "failures": str(failures), "errors": "0", "skipped": "0", "time": "0"}
-    title = visible(f"{names[0]} and {names[1]}")
-    root = ElementTree.Element("testsuites", {"name": "cylx diff", **counts})
-    suite = ElementTree.SubElement(root, "testsuite", {"name": title, **counts})
-    group, taken = _group(names[0]), Counter[str]()
-    for of, title, differences in cases:
-        taken[title] += 1
-        name = title if taken[title] == 1 else f"{title} ({taken[title]})"  # servers take the same name for one test
-        attributes = {"classname": f"{group}.{of}", "name": name, "time": "0"}
+    root = ElementTree.Element("testsuites", {"name": tool, **counts})
+    suite = ElementTree.SubElement(root, "testsuite", {"name": visible(title), **counts})
+    group, taken = _group(path), Counter[tuple[str, str]]()
+    for of, called, kind, wrong in cases:
+        taken[of, called] += 1
+        # servers take the same name for one test
+        name = called if taken[of, called] == 1 else f"{called} ({taken[of, called]})"
+        attributes = {"classname": f"{group}.{visible(of)}", "name": visible(name), "time": "0"}
         case = ElementTree.SubElement(suite, "testcase", attributes)
-        if differences:
-            lines = [visible(_said(difference)) for difference in differences]
-            failure = ElementTree.SubElement(
-                case, "failure", {"type": differences[0].kind, "message": "; ".join(lines)}
-            )
+        if wrong:
+            lines = [visible(line) for line in wrong]
+            failure = ElementTree.SubElement(case, "failure", {"type": kind, "message": "; ".join(lines)})
             failure.text = "\n".join(lines)
     ElementTree.indent(root)
     return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True)) + b"\n"
@@ -79,11 +103,11 @@ def _said(difference: Difference) -> str:
     if difference.kind in {"missing", "extra"}:
         only = ("A", difference.id_a) if difference.kind == "missing" else ("B", difference.id_b)
         radius = difference.a if difference.kind == "missing" else difference.b
-        size = "" if radius is None else f" of radius {radius:.6g}"
+        size = "" if radius is None else f" of radius {number(radius, 6)}"
         return f"{difference.kind}: {difference.what} {only[1]}{size} is only in {only[0]}"
     values = [("A", difference.a), ("B", difference.b), ("difference", difference.difference)]
     values.append(("tolerance", difference.tolerance))
-    told = ", ".join(f"{name} {value:.6g}" for name, value in values if value is not None)
+    told = ", ".join(f"{name} {number(value, 6)}" for name, value in values if value is not None)
     ids = f"id {difference.id_a} in A, {difference.id_b} in B"
     return f"{difference.kind}: {difference.what}{': ' if told else ''}{told} ({ids})"
 

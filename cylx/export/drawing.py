@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.errors import InputError
+from cylx.export.geo import MapCrs
 from cylx.export.parts import Piping, piping_of
 from cylx.export.solids import Solid
 from cylx.geometry.cylinder import Cylinder
@@ -79,12 +80,15 @@ class Drawing:
         Unit of the scan, a key of `METRES`; None if unknown.
     piping : Piping or None
         The cylinders with their fittings; None if there are none.
+    crs : MapCrs or None
+        Coordinate reference system of the scan; None if unknown.
     """
 
     cylinders: tuple[ResultCylinder, ...]
     pieces: tuple[Piece, ...]
     unit: str | None = None
     piping: Piping | None = None
+    crs: MapCrs | None = None
 
     @property
     def bodies(self) -> tuple[Body, ...]:
@@ -134,6 +138,7 @@ def draw(
     colors: NDArray[np.uint8],
     *,
     unit: str | None = None,
+    crs: MapCrs | None = None,
     place: str = "result",
     fittings: Sequence[AnyFitting] = (),
     runs: Sequence[ResultRun] = (),
@@ -146,7 +151,9 @@ def draw(
     colors : ndarray of shape (M, 3), uint8
         Red, green and blue of each.
     unit : str, optional
-        Unit of the scan: `m`, `mm`, `cm`, `in` or `ft`.
+        Unit of the scan: `m`, `mm`, `cm`, `in`, `ft` or `us-ft`.
+    crs : MapCrs, optional
+        Coordinate reference system of the scan.
     place : str
         Name of the result in an error.
     fittings : sequence of fittings
@@ -169,7 +176,7 @@ def draw(
             raise InputError(where, str(error), "give a result as cylx writes it") from None
         if shape.height > 0.0:
             pieces.append(Piece(cylinder.id, shape, (color[0], color[1], color[2]), cylinder))
-    drawing = Drawing(tuple(cylinders), tuple(pieces), unit)
+    drawing = Drawing(tuple(cylinders), tuple(pieces), unit, crs=crs)
     if not fittings:
         return drawing
     try:

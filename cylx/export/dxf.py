@@ -15,7 +15,7 @@ from cylx.export.solids import Bend, radius_of
 LAYER = "cylx_centre_lines"
 FITTINGS = "cylx_fittings"
 APPLICATION = "CYLX"
-_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6}  # $INSUNITS
+_UNITS = {"in": 1, "ft": 2, "mm": 4, "cm": 5, "m": 6, "us-ft": 21}  # $INSUNITS
 
 
 def write(drawing: Drawing, suffix: str) -> Exported:
@@ -38,7 +38,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     try:
         document = ezdxf.new("R2010")
         document.header["$INSUNITS"] = _UNITS[drawing.unit or "m"]
-        document.header["$MEASUREMENT"] = int(drawing.unit not in {"in", "ft"})
+        document.header["$MEASUREMENT"] = int(drawing.unit not in {"in", "ft", "us-ft"})
         classes = document.classes
         classes.add_required_classes(document.dxfversion)
         classes.classes = dict(sorted(classes.classes.items()))  # ezdxf takes them from a set, in random order

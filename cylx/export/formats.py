@@ -11,9 +11,9 @@ from typing import cast
 from cylx.errors import OutputError, UsageError
 from cylx.export.drawing import Drawing, Exported
 from cylx.optional.extras import LIBRARIES, require
+from cylx.units import METRES
 
-METRES = {"m": 1.0, "mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048}
-"""Length of each unit, metres."""
+__all__ = ["FORMATS", "METRES", "Format", "format_of", "render"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +80,8 @@ FORMATS = {
         Format(".ifc", "ifc", "ifcopenshell", has_unit=True, may_be_empty=True),
         Format(".dxf", "dxf", "ezdxf", has_unit=True, may_be_empty=True),
         Format(".pcf", "pcf", has_unit=True, may_be_empty=True),
+        Format(".gpkg", "maps", may_be_empty=True),
+        Format(".geojson", "maps", may_be_empty=True),
     )
 }
 

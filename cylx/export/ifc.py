@@ -15,7 +15,8 @@ def write(drawing: Drawing, suffix: str) -> Exported:
 
     Each is placed at the start of its cylinder, with its z axis along the cylinder. The property set `cylx` has its
     number, its radius, and its confidence and uncertainty. Identifiers are made of the content. With fittings, there is
-    also an `IfcPipeFitting` for each; see `add_piping`.
+    also an `IfcPipeFitting` for each; see `add_piping`. In a projected CRS, coordinates count from a place near the
+    pipes, and an `IfcMapConversion` says where that is on the map.
 
     Parameters
     ----------
@@ -37,7 +38,7 @@ def _segment(model: Model, piece: Piece) -> Any:  # noqa: ANN401  has no types
     shape = piece.shape
     across, _ = axis_basis(shape.direction)
     place = model.make(
-        "IfcAxis2Placement3D", model.point(shape.start), model.direction(shape.direction), model.direction(across)
+        "IfcAxis2Placement3D", model.place(shape.start), model.direction(shape.direction), model.direction(across)
     )
     center = model.make("IfcAxis2Placement2D", model.point((0.0, 0.0)))
     circle = model.make("IfcCircleProfileDef", "AREA", piece.name, center, shape.radius)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import uuid
+from math import floor
 from typing import Any
 
 from cylx.export.drawing import Drawing
-from cylx.export.formats import METRES
+from cylx.harmless import visible
+from cylx.units import METRES, unit_of
 from cylx.version import __version__
+from cylx.wkt import facts_of
 
 _PREFIXES = {"m": None, "mm": "MILLI", "cm": "CENTI"}
-_NAMES = {"in": "INCH", "ft": "FOOT"}
+_NAMES = {"in": "INCH", "ft": "FOOT", "us-ft": "US SURVEY FOOT"}
 _NO_TIME = "1970-01-01T00:00:00"
 Color = tuple[int, int, int]
 
@@ -43,11 +46,36 @@ class Model:
             "IfcGeometricRepresentationSubContext",
             ContextIdentifier="Body", ContextType="Model", ParentContext=context, TargetView="MODEL_VIEW",
         )  # fmt: skip
+        self.origin = self._add_map(drawing, context)
         units = self.make("IfcUnitAssignment", [self.length(unit), self.make_unit("PLANEANGLEUNIT", "RADIAN")])
         project = self.root("IfcProject", "cylx", RepresentationContexts=[context], UnitsInContext=units)
         building = self.root("IfcBuilding", "scan", ObjectPlacement=self.make("IfcLocalPlacement", None, here))
         self.root("IfcRelAggregates", "project", RelatingObject=project, RelatedObjects=[building])
         self.context, self.building = context, building
+
+    def _add_map(self, drawing: Drawing, context: object) -> tuple[float, float, float]:
+        """Say where the coordinates are on a map, and return the place from which they count; zero without a map.
+
+        The place is that of the least coordinates, in whole hundreds of units, so that the numbers in the file are
+        small: programs that draw in single precision show no steps.
+        """
+        crs = drawing.crs
+        facts = None if crs is None or crs.wkt is None else facts_of(crs.wkt)
+        if crs is None or (facts is not None and facts.kind != "projected"):
+            return 0.0, 0.0, 0.0
+        ends = [end for one in drawing.cylinders for end in (one.start, one.end)] or [[0.0] * 3]
+        least = [100.0 * floor(min(end[d] for end in ends) / 100.0) for d in range(3)]
+        factor = METRES[drawing.unit or "m"] / crs.metres
+        scale = 1.0 if abs(factor - 1.0) < 1e-9 else factor
+        name = visible(crs.name) if crs.epsg is None else f"EPSG:{crs.epsg}"
+        unit = None if scale == 1.0 else self.length(unit_of(crs.metres) or "m")
+        system = self.make("IfcProjectedCRS", Name=name, Description=visible(crs.name), MapUnit=unit)
+        self.make("IfcMapConversion", context, system, *(x * scale for x in least), 1.0, 0.0, scale)
+        return least[0], least[1], least[2]
+
+    def place(self, coordinates: Any) -> Any:  # noqa: ANN401  has no types
+        """Make a point of a place in the scan."""
+        return self.point([float(x) - begin for x, begin in zip(coordinates, self.origin, strict=True)])
 
     def contain(self, products: list[Any]) -> None:
         """Put products into the scan."""

@@ -127,7 +127,8 @@ def _port(model: Model, name: str, port: Port) -> Any:  # noqa: ANN401  has no t
 
 def _placement(model: Model, place: FloatArray, *axes: FloatArray) -> Any:  # noqa: ANN401  has no types
     """Make a placement in the scan."""
-    return model.make("IfcLocalPlacement", model.building.ObjectPlacement, _axes(model, place, *axes))
+    there = model.make("IfcAxis2Placement3D", model.place(place), *map(model.direction, axes))
+    return model.make("IfcLocalPlacement", model.building.ObjectPlacement, there)
 
 
 def _axes(model: Model, place: FloatArray, *axes: FloatArray) -> Any:  # noqa: ANN401  has no types

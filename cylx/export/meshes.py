@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cylx.export.drawing import Drawing, Exported
-from cylx.export.formats import METRES
 from cylx.export.solids import Solid, middle_of, radius_of, rings_of
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import Cylinder, axis_basis
+from cylx.units import METRES
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from cylx.export.drawing import Drawing, Exported
-from cylx.export.formats import METRES
 from cylx.export.layout import Port
 from cylx.export.parts import Part, Piping
 from cylx.export.solids import Bend
 from cylx.geometry.arrays import FloatArray
 from cylx.harmless import visible
 from cylx.results.fittings import ResultElbow, ResultFlange, ResultReducer, ResultTee
+from cylx.units import METRES
 
 MILLIMETRES = 1000.0
 SHARPEST = np.radians(150.0)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from cylx.export.drawing import Body, Drawing, Exported
-from cylx.export.formats import METRES
 from cylx.export.solids import Bend, Cone, Mitre, Solid
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder, axis_basis
+from cylx.units import METRES
 
 _NO_TIME = "1970-01-01T00:00:00"
 _STAMP = re.compile(rb"(FILE_NAME\('[^']*',')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d")
@@ -44,7 +44,7 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     labels = [_add(document, body) for body in drawing.bodies]
     STEPControl_Controller.Init_s()  # the unit can only be set after this
     before = Interface_Static.CVal_s("write.step.unit")
-    if not Interface_Static.SetCVal_s("write.step.unit", unit.upper()):
+    if not Interface_Static.SetCVal_s("write.step.unit", "M" if unit == "us-ft" else unit.upper()):  # STEP has it not
         raise RuntimeError(f"Open CASCADE does not know the unit {unit}")
     try:
         writer = STEPCAFControl_Writer()

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from cylx.io.annotated import las_obstacle as las_obstacle
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.annotated import write_annotated_stream as write_annotated_stream
+    from cylx.io.annotated import write_trees as write_trees
     from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
     from cylx.io.clouds import recorded_name as recorded_name
@@ -62,6 +63,7 @@ _HOMES = {
     "write_annotated_stream": "cylx.io.annotated",
     "write_bytes": "cylx.io.outputs",
     "write_cloud": "cylx.io.clouds",
+    "write_trees": "cylx.io.annotated",
     "write_text": "cylx.io.outputs",
 }
 

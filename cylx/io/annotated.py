@@ -36,6 +36,7 @@ _MOST_STEPS = 4.0
 """A coordinate in double precision may be off by this many steps of its file."""
 _OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "blue": "u1"}
 _OF_RUNS = {"fitting_id": "<i4", "run_id": "<i4"}
+_OF_TREES = {"treeID": "<i4", "red": "u1", "green": "u1", "blue": "u1"}
 
 
 def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool = False) -> None:
@@ -81,6 +82,55 @@ def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool
             write_pcd(file, np.concatenate([*_blocks(extraction, kept, dtype)]))
         else:
             write_ply(file, dtype, cloud.rows, _blocks(extraction, kept, dtype))
+
+
+def write_trees(path: str | Path, cloud: PointCloud, labels: NDArray[np.int32], *, overwrite: bool = False) -> None:
+    """Write all points of the input with all their properties, and the tree of each: `treeID`, from 1, 0 for none.
+
+    Colours are by tree, and names, formats and rows as `write_annotated` has them.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or `-` for standard output.
+    cloud : PointCloud
+    labels : ndarray of shape (N,)
+        Index of the tree of each point, -1 for none.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    OutputError
+        If the file exists and may not be replaced, cannot be written, or has a format that cannot hold the points.
+    """
+    check_annotated(path, cloud)
+    suffix, columns, rows = Path(path).suffix.lower(), _columns(cloud), cloud.spread(labels, -1)
+    kept = _kept(None if cloud.table is None else cloud.table.dtype, _OF_TREES)
+    dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OF_TREES.items()])
+
+    def blocks(only: list[str] | None) -> Iterator[tuple[Any, dict[str, NDArray[Any]]]]:
+        for start in range(0, len(rows), ROWS_AT_A_TIME):
+            part = slice(start, start + ROWS_AT_A_TIME)
+            colors = zip(("red", "green", "blue"), cylinder_colors(rows[part]).T, strict=True)
+            table = columns[part] if only is None else {name: columns[name][part] for name in only}  # type: ignore[index]
+            yield table, {"treeID": rows[part] + np.int32(1), **dict(colors)}
+
+    with open_output(path, overwrite=overwrite) as file:
+        if suffix in LAS_SUFFIXES and cloud.table is not None:
+            from cylx.io.las_annotated import has_colors  # noqa: PLC0415  needs an extra, or for this alone
+
+            compressed, colored = suffix == ".laz", has_colors(cloud.table)
+            pieces, kinds = blocks(None), {"treeID": "i4"}
+            _write_las_pieces(
+                file, cloud.source.header, len(rows), pieces, colored=colored, compressed=compressed, kinds=kinds
+            )
+            return
+        out = (_block(table, ours, kept, dtype, "treeID") for table, ours in blocks(list(kept)))
+        if suffix == ".pcd":
+            write_pcd(file, np.concatenate([*out]))
+        else:
+            write_ply(file, dtype, len(rows), out)
 
 
 def check_annotated(path: str | Path, cloud: PointCloud) -> None:
@@ -243,9 +293,10 @@ def _block(
     ours: dict[str, NDArray[Any]],
     kept: dict[str, tuple[str, np.dtype[Any]]],
     dtype: np.dtype[np.void],
+    one: str = "cylinder_id",
 ) -> NDArray[np.void]:
-    """Return rows of the output."""
-    block = np.empty(len(ours["cylinder_id"]), dtype)
+    """Return rows of the output; `one` is any of our properties."""
+    block = np.empty(len(ours[one]), dtype)
     for name, (new, _) in kept.items():
         block[new] = columns[name]
     for name, values in ours.items():
@@ -277,6 +328,7 @@ def _write_las_pieces(
     colored: bool,
     compressed: bool,
     runs: bool = False,
+    kinds: dict[str, str] | None = None,
 ) -> None:
     """Write LAS or LAZ, through an unnamed temporary file if the output cannot seek, or has to be read again."""
     from cylx.io.las_annotated import write_las  # noqa: PLC0415  needs an extra, or for this alone
@@ -285,9 +337,9 @@ def _write_las_pieces(
     if header is None:
         raise ValueError("only clouds from LAS and LAZ can be written as such")
     if file.seekable() and not has_letters(header):
-        write_las(file, header, count, pieces, colored=colored, compressed=compressed, runs=runs)
+        write_las(file, header, count, pieces, colored=colored, compressed=compressed, runs=runs, kinds=kinds)
         return
     with tempfile.TemporaryFile() as copy:
-        write_las(copy, header, count, pieces, colored=colored, compressed=compressed, runs=runs)
+        write_las(copy, header, count, pieces, colored=colored, compressed=compressed, runs=runs, kinds=kinds)
         copy.seek(0)
         shutil.copyfileobj(copy, file)

@@ -25,17 +25,25 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None = None) -> PointCloud:  # noqa: A002  the natural name
+def read_cloud(
+    path: str | Path,
+    *,
+    format: str | None = None,  # noqa: A002  the natural name
+    scan: int | None = None,
+    units: str | None = None,
+) -> PointCloud:
     """Read a point cloud with all properties of its points.
 
     Parameters
     ----------
     path : str or Path
-        A PLY, PCD, text, LAS, LAZ, E57, NPY or NPZ file, optionally packed by gzip, or `-` for standard input.
-    format : {"ply", "pcd", "xyz", "las", "e57", "npy"}, optional
+        A PLY, PCD, text, LAS, LAZ, E57, PTX, NPY or NPZ file, optionally packed by gzip, or `-` for standard input.
+    format : {"ply", "pcd", "xyz", "las", "e57", "npy", "ptx"}, optional
         Its format; by default from the suffix, or else from the content. LAZ is `las`, NPZ is `npy`.
     scan : int, optional
-        Number of the scan of an E57 file to read, from 0; by default all.
+        Number of the scan of an E57 or PTX file to read, from 0; by default all.
+    units : {"m", "mm", "cm", "in", "ft", "us-ft"}, optional
+        Unit of its coordinates; by default what the file says, if it does.
 
     Returns
     -------
@@ -55,12 +63,14 @@ def read_cloud(path: str | Path, *, format: str | None = None, scan: int | None 
     packed = cloud_name(path) != str(path)
     with open_input(path) as file, unpacked(file, packed=packed) as source:
         kind = format or recognise(source, cloud_suffix(path))
-        if scan is not None and kind != "e57":
-            raise InputError(source.place, "is not E57, so no scan can be chosen", "leave --scan out")
+        if scan is not None and kind not in ("e57", "ptx"):
+            raise InputError(source.place, "is neither E57 nor PTX, so no scan can be chosen", "leave --scan out")
         try:
             table, facts = _read(source, kind, scan)
         except MemoryError:
             raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
+        if units is not None:
+            facts["units"] = units
         origin = Source(_file_name(path), kind, source.sha256, Selection(scan=scan), **facts)
         return _cloud(table, source.place, origin)
 
@@ -72,7 +82,7 @@ def recorded_name(path: str | Path) -> str:
 
 def cloud_suffixes() -> tuple[str, ...]:
     """Return the suffixes, in lower case, of the files in a folder that count as clouds; NPY may hold anything else."""
-    return (".ply", ".pcd", *TEXT_SUFFIXES, *LAS_SUFFIXES, ".e57")
+    return (".ply", ".pcd", *TEXT_SUFFIXES, *LAS_SUFFIXES, ".e57", ".ptx")
 
 
 def write_cloud(
@@ -126,18 +136,26 @@ def _file_name(path: str | Path) -> str:
 def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], dict[str, Any]]:
     """Read the table of a file, and what else its source says; rarely needed readers are imported late."""
     if kind == "las":
+        from cylx.io.crs import las_source  # noqa: PLC0415  for this alone
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
         from cylx.io.las_header import kept_header, las_header  # noqa: PLC0415  for this alone
 
         facts = las_header(source)
         libraries = ("laspy", "lazrs") if facts.compressed else ("laspy",)
         require(*libraries, place=source.place, needed_by="", error=InputError, imported=False)
-        return read_isolated(source, "las"), {"header": kept_header(source, facts), "doubts": facts.doubts}
+        table = read_isolated(source, "las")
+        return table, las_source(kept_header(source, facts), facts)
     if kind == "e57":
+        from cylx.io.crs import e57_source  # noqa: PLC0415  for this alone
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes
 
         require("pye57", place=source.place, needed_by="", error=InputError, imported=False)
-        return read_isolated(source, "e57", scan=scan), {}
+        table = read_isolated(source, "e57", scan=scan)
+        return table, e57_source(source)
+    if kind == "ptx":
+        from cylx.io.ptx import read_ptx  # noqa: PLC0415  for this alone
+
+        return read_ptx(source, scan)
     if kind == "npy":
         from cylx.io.npy import read_npy  # noqa: PLC0415  needs an extra, or for this alone
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from xml.parsers import expat
 
 from cylx.errors import InputError
+from cylx.wkt import LONGEST
 
 if TYPE_CHECKING:
     from cylx.io.inputs import Input
@@ -61,6 +62,36 @@ def check_xml(source: Input) -> None:
         raise InputError(source.place, fault, _REMEDY) from None
     except _ExtremeError as error:
         raise InputError(source.place, f"its XML has {error}, which E57 does not use", _MISTRUST) from None
+
+
+def coordinate_metadata(source: Input) -> str:
+    """Return what an E57 file says of its coordinate reference system, as a rule WKT; empty if it says nothing.
+
+    Parameters
+    ----------
+    source : Input
+        A file whose XML was checked.
+    """
+    found: list[str] = []
+    path: list[str] = []
+    parser = expat.ParserCreate()
+
+    def down(name: str, _attributes: dict[str, str]) -> None:
+        path.append(name)
+
+    def up(_name: str) -> None:
+        path.pop()
+
+    def text(part: str) -> None:
+        if path == ["e57Root", "coordinateMetadata"] and len(found) <= LONGEST:
+            found.append(part)
+
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = down, up, text
+    try:
+        parser.Parse(_xml(source).removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n"), True)
+    except (expat.ExpatError, LookupError):
+        return ""
+    return "".join(found)[:LONGEST]
 
 
 class _ExtremeError(Exception):

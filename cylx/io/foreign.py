@@ -18,7 +18,6 @@ class Foreign(NamedTuple):
     remedy: str
 
 
-_PTX = Foreign("PTX, scans of Leica", _EXPORT)
 _OBJ = Foreign("OBJ, a mesh", _SAMPLE)
 _STL = Foreign("STL, a mesh", _SAMPLE)
 _OFF = Foreign("OFF, a mesh", _SAMPLE)
@@ -59,7 +58,6 @@ _LFS = Foreign("a pointer of Git LFS, not the file itself", "fetch it by 'git lf
 _PROGRAM = Foreign("a program", "give a scan")
 
 BY_SUFFIX = {
-    **dict.fromkeys((".ptx",), _PTX),
     **dict.fromkeys((".obj",), _OBJ),
     **dict.fromkeys((".stl",), _STL),
     **dict.fromkeys((".off",), _OFF),

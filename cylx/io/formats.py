@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,15 +14,21 @@ if TYPE_CHECKING:
 
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc")
 LAS_SUFFIXES = (".las", ".laz")
-FORMATS = ("ply", "pcd", "xyz", "las", "e57", "npy")
+FORMATS = ("ply", "pcd", "xyz", "las", "e57", "npy", "ptx")
+MAY_SAY_UNITS = ("las", "e57", "ptx")
+"""Formats whose files may say the unit of their lengths."""
 _CERTAIN = {
     ".ply": "ply",
     ".pcd": "pcd",
     **dict.fromkeys(LAS_SUFFIXES, "las"),
     ".e57": "e57",
+    ".ptx": "ptx",
     ".npy": "npy",
     ".npz": "npy",
 }
+PTX_HEADER = (1, 1, 3, 3, 3, 3, 4, 4, 4, 4)
+"""Numbers in each line above the points of a scan of a PTX file."""
+PTX_NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _ZIP = b"PK\x03\x04"
 _BEGINNINGS = {
     b"LASF": "las",
@@ -35,6 +42,11 @@ _HEAD = 1024
 _BOM = b"\xef\xbb\xbf"
 _WIDE_TEXT = (b"\xff\xfe", b"\xfe\xff")
 _ARCHIVES = (".zip", ".xlsx", ".docx", ".ods", ".odt", ".kmz", ".usdz", ".3mf", ".ifczip")
+
+
+def silent_suffixes() -> tuple[str, ...]:
+    """Return the suffixes of files that never say the unit of their lengths."""
+    return (*(suffix for suffix, kind in _CERTAIN.items() if kind not in MAY_SAY_UNITS), *TEXT_SUFFIXES)
 
 
 def cloud_suffix(path: str | Path) -> str:
@@ -84,12 +96,24 @@ def recognise(source: Input, suffix: str) -> str:
     for beginning, kind in _BEGINNINGS.items():
         if head.startswith(beginning) and not (beginning == _ZIP and suffix in _ARCHIVES):
             return kind
+    if is_ptx(whole):
+        return "ptx"
     foreign = foreign_suffix(suffix) or foreign_content(whole)
     if foreign is not None:
         raise _unread(source, foreign)
     if suffix not in TEXT_SUFFIXES and b"\0" in head and not whole.startswith(_WIDE_TEXT):
         raise InputError(source.place, "is neither text nor of a format that cylx reads", "convert it to PLY")
     return "xyz"
+
+
+def is_ptx(head: bytes) -> bool:
+    """Return whether a file that begins with these bytes is PTX."""
+    lines = head.removeprefix(b"\xef\xbb\xbf").lstrip().splitlines()[: len(PTX_HEADER)]
+    words = [line.split() for line in lines]
+    if len(words) == len(PTX_HEADER) and not head.endswith(b"\n") and len(head.splitlines()) == len(PTX_HEADER):
+        words = words[:-1]  # the last line may be cut
+    expected = list(PTX_HEADER)[: max(len(words), len(PTX_HEADER) - 1)]
+    return [len(one) for one in words] == expected and all(PTX_NUMBER.fullmatch(w) for one in words for w in one)
 
 
 def _unread(source: Input, foreign: Foreign) -> InputError:

@@ -33,6 +33,7 @@ def write_las(
     colored: bool,
     compressed: bool,
     runs: bool = False,
+    kinds: dict[str, str] | None = None,
 ) -> None:
     """Write the points of a LAS file again, with the cylinder of each.
 
@@ -55,10 +56,12 @@ def write_las(
         Whether to write LAZ.
     runs : bool
         Whether the blocks have `fitting_id` and `run_id` as well.
+    kinds : dict of str to str, optional
+        Other extra bytes instead of ours, by name, and their types.
     """
     import laspy  # noqa: PLC0415  an extra
 
-    kinds = _OURS | _OF_RUNS if runs else _OURS
+    kinds = kinds or (_OURS | _OF_RUNS if runs else _OURS)
     with quiet_laspy():
         header = laspy.LasHeader.read_from(io.BytesIO(mended(kept, count)), read_evlrs=True)
         columns = las_dimensions(header.point_format)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.clouds import read_cloud
+from cylx.io.crs import las_source
 from cylx.io.formats import cloud_name, cloud_suffix, recognise
 from cylx.io.inputs import Input, check_unchanged, printable, sha256_of, stamp_of
 from cylx.io.las import las_parts, libraries_for
@@ -20,6 +21,7 @@ from cylx.io.las_header import kept_header, las_header
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.npy import columns_of, map_npy
 from cylx.io.ply_header import TYPES, Header, read_header
+from cylx.io.ptx import ptx_columns, ptx_facts, ptx_parts, ptx_scans
 from cylx.optional.extras import require
 from cylx.records import PointCloud, Source
 
@@ -77,10 +79,10 @@ class StreamedCloud:
         raise InputError(printable(self.source.file), "no point has finite coordinates", "export the file again")
 
 
-def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None) -> StreamedCloud:
+def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, units: str | None = None) -> StreamedCloud:
     """Open a cloud to be read piece by piece.
 
-    LAS, LAZ, NPY and binary PLY are read from their file. Other formats are read once as a whole, and from then on
+    LAS, LAZ, NPY, PTX and binary PLY are read from their file. Other formats are read once as a whole, and from then on
     from a copy on the disk.
 
     Parameters
@@ -89,7 +91,9 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None) -> S
     spool : Path
         Where the copy may be put.
     scan : int, optional
-        Number of the scan of an E57 file to read.
+        Number of the scan of an E57 or PTX file to read.
+    units : str, optional
+        Unit of its coordinates; by default what the file says.
 
     Returns
     -------
@@ -106,8 +110,13 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None) -> S
             kind = recognise(source, cloud_suffix(path))
             streamed = _STREAMED[kind](source, Path(path)) if kind in _STREAMED else None
         if streamed is not None:
-            return _guarded(streamed, path, stamp, digest)
-    return _spooled(read_cloud(path, scan=scan), spool)
+            return _stated(_guarded(streamed, path, stamp, digest), units)
+    return _spooled(read_cloud(path, scan=scan, units=units), spool)
+
+
+def _stated(cloud: StreamedCloud, units: str | None) -> StreamedCloud:
+    """Return a cloud in units that are given."""
+    return cloud if units is None else replace(cloud, source=replace(cloud.source, units=units))
 
 
 def stream_arrays(pieces: Iterable[ArrayLike], spool: Path) -> StreamedCloud:
@@ -170,7 +179,7 @@ def _source(source: Input, path: Path, kind: str, **facts: Any) -> Source:  # no
 def _stream_las(source: Input, path: Path) -> StreamedCloud:
     facts = las_header(source)
     require(*libraries_for(facts), place=source.place, needed_by="", error=InputError)
-    about = _source(source, path, "las", header=kept_header(source, facts), doubts=facts.doubts)
+    about = _source(source, path, "las", **las_source(kept_header(source, facts), facts))
 
     def parts() -> Iterator[NDArray[np.void]]:
         with _opened(path, source.sha256) as file:
@@ -225,10 +234,22 @@ def _ply_rows(header: Header) -> np.dtype[np.void]:
     return np.dtype([(name, order + TYPES[item.type]) for name, item in zip(names, properties, strict=True)])
 
 
+def _stream_ptx(source: Input, path: Path) -> StreamedCloud:
+    scans = ptx_scans(source)
+
+    def parts() -> Iterator[NDArray[np.void]]:
+        with _opened(path, source.sha256) as file:
+            yield from _of_size(ptx_parts(file, scans))
+
+    about = _source(source, path, "ptx", **ptx_facts(scans))
+    return StreamedCloud(about, sum(one.count for one in scans), ptx_columns(scans), parts)
+
+
 _STREAMED: dict[str, Callable[[Input, Path], StreamedCloud | None]] = {
     "las": _stream_las,
     "npy": _stream_npy,
     "ply": _stream_ply,
+    "ptx": _stream_ptx,
 }
 
 

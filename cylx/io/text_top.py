@@ -265,7 +265,7 @@ def _check_first_row(where: str, columns: Sequence[str]) -> None:
 
 
 def _refuse_ptx(below: Sequence[_Line], place: str) -> None:
-    """Refuse a PTX file: its rows are seen from the scanner, and a matrix says where that is."""
+    """Refuse a PTX file that was not recognised: its rows are seen from the scanner, whose pose is above them."""
     found = [[is_number(word) for word in line.row.split()] for line in below[: len(_PTX)]]
     if [len(words) for words in found] == _PTX and all(all(words) for words in found):
-        raise InputError(place, "is PTX, which cylx does not read", "export it as E57 or PLY")
+        raise InputError(place, "is PTX with something above it", "remove what is above the first count")

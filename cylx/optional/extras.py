@@ -34,6 +34,8 @@ LIBRARIES = {
     "ifcopenshell": Library("ifc", "export of IFC"),
     "ezdxf": Library("dxf", "export of DXF"),
     "distributed": Library("dask", "clusters"),
+    "CSF": Library("forest", "the ground of a plot by a cloth"),
+    "pyproj": Library("crs", "coordinate reference systems"),
     "pandas": Library("dataframe", "data frames"),
 }
 """Optional libraries by import name."""

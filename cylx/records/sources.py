@@ -54,6 +54,25 @@ class Selection:
 
 
 @dataclass(frozen=True, slots=True)
+class Crs:
+    """A coordinate reference system.
+
+    Parameters
+    ----------
+    name : str
+        Its name.
+    wkt : str or None
+        Its definition; None if only its code is known.
+    epsg : int or None
+        Code of EPSG of the whole, or of its horizontal part.
+    """
+
+    name: str
+    wkt: str | None = None
+    epsg: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Source:
     """The source of a cloud.
 
@@ -62,7 +81,7 @@ class Source:
     file : str
         The name as the user gave it, `-` for standard input, `<array>` for an array.
     format : str
-        `ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `array`.
+        `ply`, `pcd`, `xyz`, `las`, `e57`, `npy`, `ptx` or `array`.
     sha256 : str or None
         Digest of the bytes read; None for an array.
     selection : Selection
@@ -73,6 +92,10 @@ class Source:
         What a reader should know about how the file was read, one line each.
     doubts : tuple of (str, str)
         What may have been read wrongly, and the remedy.
+    units : str or None
+        Unit of length of the coordinates, a key of `cylx.units.METRES`; None if unknown.
+    crs : Crs or None
+        Their coordinate reference system; None if the file says none.
     """
 
     file: str
@@ -82,6 +105,8 @@ class Source:
     header: bytes | None = None
     notes: tuple[str, ...] = ()
     doubts: tuple[tuple[str, str], ...] = ()
+    units: str | None = None
+    crs: Crs | None = None
 
 
 ARRAY = Source("<array>", "array")

@@ -18,6 +18,7 @@ from cylx.report.page_data import maps_of, view_of
 from cylx.report.plots import with_deviation
 from cylx.report.view import View
 from cylx.results import Result
+from cylx.wording import number
 
 if TYPE_CHECKING:
     from typing import Any
@@ -154,7 +155,7 @@ def _row(cylinder: ResultCylinder) -> str:
     cells = (
         f"<span style='color: rgb({red}, {green}, {blue})'>&#9632;</span> {cylinder.id}",
         with_deviation(cylinder.radius, deviation),
-        f"{cylinder.height:.4g}",
+        number(cylinder.height, 4),
         f"{cylinder.coverage_deg:.0f}°",
         "" if cylinder.confidence is None else f"{cylinder.confidence:.2f}",
     )

@@ -17,6 +17,7 @@ from cylx.report.view import View
 from cylx.results import RejectedCylinder, Result
 from cylx.results.parts import drop_missing
 from cylx.results.quantities import quantities_of
+from cylx.wording import number as plain_number
 
 if TYPE_CHECKING:
     from cylx.records import Extraction
@@ -74,7 +75,7 @@ def _parts(content: Result) -> dict[str, Any]:
 
 
 def _text(value: str | float | None) -> str:
-    return "–" if value is None else value if isinstance(value, str) else f"{value:.4g}"  # noqa: RUF001  a dash
+    return "–" if value is None else value if isinstance(value, str) else plain_number(value, 4)  # noqa: RUF001  a dash
 
 
 def view_of(view: View, most_points: int) -> dict[str, Any]:

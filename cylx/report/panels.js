@@ -19,6 +19,12 @@ function make(tag, properties = {}, ...children) {
 
 const number = (value, digits = 4) => (value === undefined ? "–" : String(Number(value.toPrecision(digits))));
 const vector = (values, digits = 8) => values.map((value) => number(value, digits)).join(", ");
+/** Write coordinates; those of maps have more digits, down to the noise. */
+function coordinates(values, digits = 8) {
+  const decimals = Math.min(6, Math.max(0, 1 - Math.floor(Math.log10(result.scene.noise || 1))));
+  const whole = (value) => (Math.abs(value) < 1 ? 0 : Math.floor(Math.log10(Math.abs(value))) + 1);
+  return values.map((value) => number(value, Math.max(digits, Math.abs(value) < 1000 ? 0 : whole(value) + decimals))).join(", ");
+}
 const fraction = (value) => (value === undefined ? "–" : value.toFixed(3).replace(/^-(0\.0*)$/, "$1"));
 const degrees = (value) => (value === undefined ? "–" : `${number(value, 2)}°`);
 
@@ -147,8 +153,8 @@ function showDetails() {
   const values = definitions([
     ["radius", uncertain(one.radius, sd?.radius)],
     ["height", number(one.height, 5)],
-    ["start", vector(one.start)],
-    ["end", vector(one.end)],
+    ["start", coordinates(one.start)],
+    ["end", coordinates(one.end)],
     ["direction", vector(one.axis_direction, 6)],
     ["axis sd", sd && `${number(sd.axis_angle_deg, 3)}°, ${number(sd.axis_offset, 3)} aside`],
     ["points", `${one.inliers}, rmse ${number(one.rmse, 3)}`],
@@ -246,13 +252,14 @@ function makeSections() {
     ["format", input.format],
     ["points", String(input.points)],
     ["properties", facts.fields.join(", ")],
-    ["min", vector(input.bounds.min, 10)],
-    ["max", vector(input.bounds.max, 10)],
+    ["min", coordinates(input.bounds.min, 10)],
+    ["max", coordinates(input.bounds.max, 10)],
     ["spacing, noise", `${number(result.scene.spacing)}, ${number(result.scene.noise)}`],
     ["sha256", input.sha256],
     ["method", result.method],
     ["cylx", result.cylx_version],
   ]));
+  for (const table of facts.tables ?? []) section(table.title, tableOf(table.heads, table.lines), true);
   const reasons = (stage) => Object.entries(stage.rejected).map(([reason, count]) => `${reason} ${count}`).join(", ");
   section("Stages", tableOf(["stage", "considered", "kept", "rejected"],
     stages.map((stage) => [stage.name, String(stage.considered), String(stage.kept), reasons(stage)])));
@@ -261,13 +268,13 @@ function makeSections() {
     ["id", "radius", "height", "points", "coverage", "confidence", "side", "middle"],
     blends.map((one) => [String(one.id), uncertain(one.radius, one.uncertainty?.radius), number(one.height),
       String(one.inliers), `${one.coverage_deg.toFixed(0)}°`, fraction(one.confidence), one.side ?? "–",
-      vector(one.axis_point, 5)])));
+      coordinates(one.axis_point, 5)])));
   if (result.runs) makeRuns();
   const some = facts.rejected.length < facts.rejected_count ? `the first ${facts.rejected.length} of ` : "";
   section(`Not accepted (${some}${facts.rejected_count})`, tableOf(
     ["reason", "radius", "height", "points", "coverage", "confidence", "middle"],
     facts.rejected.map((one) => [one.reason, number(one.radius), number(one.height), String(one.inliers),
-      `${one.coverage_deg.toFixed(0)}°`, fraction(one.confidence), vector(one.axis_point, 5)])));
+      `${one.coverage_deg.toFixed(0)}°`, fraction(one.confidence), coordinates(one.axis_point, 5)])));
   section("Configuration", make("pre", {}, facts.config));
 }
 

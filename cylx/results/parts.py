@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from cylx.harmless import visible
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, Selection, Source, TiledExtraction
+    from cylx.records import Extraction, PointCloud, Selection, Source, TiledExtraction
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[Number, Field(ge=0)]
@@ -46,13 +46,32 @@ class Crop(Part):
     """Largest coordinates, scene units."""
 
 
+class InputCrs(Part):
+    """A coordinate reference system."""
+
+    name: str
+    """Its name."""
+    wkt: str | None = None
+    """Its definition as WKT; absent if only its code is known."""
+    epsg: Annotated[int, Field(ge=1)] | None = None
+    """Code of EPSG of the whole, or of its horizontal part; absent if it is not known."""
+
+    @classmethod
+    def of(cls, sources: Sequence[Source]) -> InputCrs | None:
+        """Describe the CRS of the files of a cloud; None if there is none, or more than one."""
+        first = sources[0].crs
+        if first is None or any(source.crs != first for source in sources):
+            return None
+        return cls(name=first.name, wkt=first.wkt, epsg=first.epsg)
+
+
 class InputFile(Part):
     """One of several files that are one cloud."""
 
     file: str
     """Name of the file without its folder."""
     format: str
-    """`ply`, `pcd`, `xyz`, `las`, `e57` or `npy`."""
+    """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `ptx`."""
     points: Count
     """Number of points, including those without finite coordinates and those not used."""
     sha256: str | None = None
@@ -65,7 +84,7 @@ class Input(Part):
     file: str
     """Name of the file without its folder; `-` for standard input, `<array>` for an array."""
     format: str
-    """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy` or `array`."""
+    """`ply`, `pcd`, `xyz`, `las`, `e57`, `npy`, `ptx` or `array`."""
     points: Count
     """Number of points, including those without finite coordinates and those not used."""
     sha256: str | None = None
@@ -84,6 +103,10 @@ class Input(Part):
     """Only one point was used in each cell of this side, scene units; absent if all were used."""
     bounds: Bounds
     """Bounding box of the points used."""
+    units: Literal["m", "mm", "cm", "in", "ft", "us-ft"] | None = None
+    """Unit of all lengths, from the file or from `--units`; absent if unknown."""
+    crs: InputCrs | None = None
+    """Coordinate reference system of the points; absent if the file says none."""
 
     @staticmethod
     def keys_of(selection: Selection) -> dict[str, Any]:
@@ -108,7 +131,11 @@ class Input(Part):
 
         if isinstance(extraction, TiledExtraction):
             return cls._of_tiled(extraction)
-        cloud = extraction.cloud
+        return cls.of_cloud(extraction.cloud)
+
+    @classmethod
+    def of_cloud(cls, cloud: PointCloud) -> Input:
+        """Describe the points of a cloud."""
         return cls(
             file=_name_of(cloud.source),
             format=cloud.source.format,
@@ -116,6 +143,7 @@ class Input(Part):
             sha256=cloud.source.sha256,
             **cls.keys_of(cloud.source.selection),
             bounds=Bounds(min=plain_numbers(cloud.points.min(axis=0)), max=plain_numbers(cloud.points.max(axis=0))),
+            **cls._lengths_of([cloud.source]),
         )
 
     @classmethod
@@ -134,7 +162,20 @@ class Input(Part):
             files=files if len(files) > 1 else None,
             **cls.keys_of(extraction.selection),
             bounds=Bounds(min=low, max=high),
+            **cls._lengths_of(extraction.sources),
         )
+
+    @staticmethod
+    def _lengths_of(sources: Sequence[Source]) -> dict[str, Any]:
+        """Return the unit and the CRS of the files of a cloud, where they have the same."""
+        units = {source.units for source in sources}
+        return {"units": units.pop() if len(units) == 1 else None, "crs": InputCrs.of(sources)}
+
+    def to_object(self) -> dict[str, Any]:
+        """Return the JSON object; what is not known is left out."""
+        content = self.model_dump(mode="json")
+        drop_missing([content, content["crs"] or {}])
+        return content
 
 
 def _name_of(source: Source) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from cylx.harmless import cell
+from cylx.wording import number
 
 if TYPE_CHECKING:
     from cylx.results.cylinders import ResultCylinder
@@ -60,7 +61,7 @@ def quantities_csv(result: Result) -> str:
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
     for row in quantities_of(result):
-        numbers = {key: f"{row[key]:.6g}" for key in ("angle_deg", "bend_radius", "length") if row[key] is not None}
+        numbers = {key: number(row[key], 6) for key in ("angle_deg", "bend_radius", "length") if row[key] is not None}
         said = {"assumed": "yes" if row["assumed"] else "no"}
         writer.writerow([cell("" if value is None else value) for value in (row | numbers | said).values()])
     return text.getvalue()
@@ -87,7 +88,7 @@ def _sizes(result: Result) -> dict[int, tuple[float, str]]:
         length = sum(one.height for one in members)
         weights = [one.height / length if length > 0 else 1.0 / len(members) for one in members]
         diameter = 2.0 * sum(weight * one.radius for weight, one in zip(weights, members, strict=True))
-        name = key if isinstance(key, str) else f"{diameter:.4g}"
+        name = key if isinstance(key, str) else number(diameter, 4)
         out.update({one.id: (diameter, name) for one in members})
     return out
 

@@ -68,8 +68,8 @@ class Rejections(Part):
     def to_object(self) -> dict[str, Any]:
         """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        drop_missing([content["input"], *content["rejected"]])
-        return content
+        drop_missing(content["rejected"])
+        return content | {"input": self.input.to_object()}
 
     def to_json(self) -> str:
         """Return the text of the file, with a newline at its end."""

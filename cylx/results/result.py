@@ -199,8 +199,9 @@ class Result(Part):
     def to_object(self) -> dict[str, Any]:
         """Return the JSON object; what was not computed is left out."""
         content = self.model_dump(mode="json", by_alias=True)
-        drop_missing([content, content["input"], content["scene"], content.get("tiles") or {}])
-        lists = {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
+        drop_missing([content, content["scene"], content.get("tiles") or {}])
+        lists: dict[str, Any] = {"input": self.input.to_object()}
+        lists |= {"cylinders": [cylinder.to_object() for cylinder in self.cylinders]}
         if self.blends is not None:
             lists["blends"] = [blend.to_object() for blend in self.blends]
         if self.fittings is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from cylx.wording import fittings_counted
+from cylx.wording import fittings_counted, number
 
 if TYPE_CHECKING:
     from cylx.results.result import Result
@@ -29,13 +29,13 @@ def runs_rows(result: Result, most: int = MOST_ROWS) -> list[list[str]]:
     for run in result.runs or ():
         if not run.fittings:
             continue
-        sizes = ", ".join(size.nominal or f"{2 * size.radius:.4g}" for size in run.sizes)
+        sizes = ", ".join(size.nominal or number(2 * size.radius, 4) for size in run.sizes)
         reasons = Counter(one.reason.replace("_", " ") for one in run.open_ends)
         ends = ", ".join(f"{count} {reason}" for reason, count in sorted(reasons.items()))
         rows.append(
             [
                 str(run.id),
-                f"{run.length:.4g}",
+                number(run.length, 4),
                 sizes,
                 "" if run.slope is None else f"{100 * run.slope:.1f} %".replace("-0.0", "0.0"),
                 str(len(run.cylinders)),

@@ -12,7 +12,7 @@ SEEDS = Path(__file__).parent / "seeds"
 _MEMORY = Path("/dev/shm")
 _SUFFIXES = {
     "xyz": ".xyz", "csv": ".csv", "pts": ".pts", "ply": ".ply", "pcd": ".pcd", "npy": ".npy", "npz": ".npz",
-    "guessed": "",
+    "ptx": ".ptx", "guessed": "",
 }  # fmt: skip
 
 
@@ -158,6 +158,22 @@ def read_catalogue(suffix):
     return read
 
 
+def read_a_design(suffix):
+    def read(data):
+        from cylx.deviation import shapes_of
+        from cylx.io.design import read_design
+
+        shapes_of(read_design(SCRATCH.put(f"design{suffix}", data)))
+
+    return read
+
+
+def read_wkt(data):
+    from cylx.io.crs import crs_facts
+
+    crs_facts(data.decode("utf-8", "replace"))
+
+
 def read_result(data):
     from cylx.io import read_json
     from cylx.results import Result
@@ -244,6 +260,9 @@ FUNCTIONS = {
     "override": read_override,
     "catalogue": read_catalogue(".csv"),
     "catalogue-yaml": read_catalogue(".yaml"),
+    "design-csv": read_a_design(".csv"),
+    "design-json": read_a_design(".json"),
+    "wkt": read_wkt,
     "result": read_result,
     "compare": compare,
     "truth": evaluate,

@@ -8,7 +8,6 @@ from cylx.errors import InputError
 from cylx.io import read_cloud
 
 CONTENTS = {
-    "PTX, scans of Leica": ["scan.ptx"],
     "OBJ, a mesh": ["scan.obj", b"# a mesh\nmtllib a.mtl\nv 1 2 3\nv 4 5 6\nv 7 8 9\nf 1 2 3\n"],
     "STL, a mesh": ["scan.stl", b"solid thing\n facet normal 0 0 1\n  outer loop\n"],
     "OFF, a mesh": ["scan.off", b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"],

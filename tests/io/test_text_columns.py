@@ -269,8 +269,8 @@ WRONG = {
         ":11: the line is too long for a row; give every point a line",
     ),
     "PTX": (
-        "2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" + "1 0 0 0\n" * 4 + "1 2 3 0.5\n" * 4,
-        ": is PTX, which cylx does not read; export it as E57 or PLY",
+        "scan\n2\n2\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n" + "1 0 0 0\n" * 4 + "1 2 3 0.5\n" * 4,
+        ": is PTX with something above it; remove what is above the first count",
     ),
 }
 

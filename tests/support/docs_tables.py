@@ -16,7 +16,9 @@ import cylx
 from cylx.cli import main
 from cylx.config import Config, load_config
 from cylx.config.yaml_writer import _allowed, _scalar
+from cylx.deviation.document import deviation_schema
 from cylx.results import rejections_schema, result_schema
+from cylx.results.stems import stems_schema
 from tests.support.arrows import MAY_IMPORT
 
 PACKAGE = Path(__file__).resolve().parents[2] / "cylx"
@@ -223,6 +225,18 @@ def rejected_format():
     return json_format(rejections_schema(), known=[name for name, _, _ in parts_of(result_schema()) if name])
 
 
+def deviation_format():
+    """Write every key of the file of a comparison with a design that the result does not have."""
+    known = [name for name, _, _ in parts_of(result_schema()) if name]
+    return json_format(deviation_schema(), known).replace("### What was not accepted", "### The comparison", 1)
+
+
+def stems_format():
+    """Write every key of the file of stems that the result does not have."""
+    known = [name for name, _, _ in parts_of(result_schema()) if name]
+    return json_format(stems_schema(), known).replace("### What was not accepted", "### The plot", 1)
+
+
 # --- the Python interface
 
 
@@ -331,6 +345,8 @@ TABLES = {
     "command line": command_line,
     "json format": json_format,
     "rejected format": rejected_format,
+    "deviation format": deviation_format,
+    "stems format": stems_format,
     "python": python,
     "rooms": rooms,
     "arrows": arrows,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from cylx.cli.terminal.display import Messages, show_table
 from cylx.cli.terminal.failures import tell
-from cylx.wording import counted, piping_counted
+from cylx.wording import counted, number, piping_counted
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
@@ -29,7 +29,7 @@ def report(messages: Messages, job: Job, extraction: Extraction | TiledExtractio
         tell(f"warning: {warning}")
     if messages.verbose:
         scene = extraction.scene
-        tell(f"spacing {scene.spacing:.4g}, noise {scene.noise:.4g}, extent {scene.extent:.4g}")
+        tell(", ".join(f"{name} {number(getattr(scene, name), 4)}" for name in ("spacing", "noise", "extent")))
         show_table(["stage", "considered", "kept", "rejected"], _stage_rows(extraction), err=True)
     if fits:
         shown = fits if messages.verbose else fits[:_MOST_ROWS]
@@ -55,12 +55,12 @@ def _cylinder_row(index: int, fit: CylinderFit) -> list[str]:
     """Format one row of the table of cylinders."""
     shape = fit.cylinder
     direction = " ".join(f"{x:.3f}".replace("-0.000", "0.000") for x in shape.direction)
-    numbers = [f"{shape.radius:.5g}", f"{shape.height:.4g}", f"{fit.coverage * 57.29577951308232:.0f}°"]
+    numbers = [number(shape.radius, 5), number(shape.height, 4), f"{fit.coverage * 57.29577951308232:.0f}°"]
     return [
         str(index),
         *numbers,
         str(fit.inliers),
-        f"{fit.rmse:.3g}",
+        number(fit.rmse, 3),
         "-" if fit.confidence is None else f"{fit.confidence:.2f}",
         direction,
     ]
@@ -71,7 +71,7 @@ def _nominal(fit: CylinderFit) -> str:
     nominal = fit.nominal
     if nominal is None or nominal.decision == "none":
         return "-"
-    return (nominal.name or f"{nominal.nominal_radius:.5g}") + ("?" if nominal.decision == "ambiguous" else "")
+    return (nominal.name or number(nominal.nominal_radius, 5)) + ("?" if nominal.decision == "ambiguous" else "")
 
 
 def _stage_rows(extraction: Extraction | TiledExtraction) -> list[list[str]]:

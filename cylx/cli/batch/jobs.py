@@ -40,7 +40,7 @@ class Job:
     mesh : str or None
         The mesh of the cylinders, None to write none.
     units : str or None
-        Unit of the scan, for mesh formats that have a unit; None if unknown.
+        Unit of the scan; None for what the scan says.
     """
 
     scan: str
@@ -133,7 +133,8 @@ def plan_jobs(
     if picture is not None:
         jobs = [replace(job, picture=_inside(picture, job.scan, PICTURE)) for job in jobs]
     if mesh is not None:
-        jobs = [replace(job, mesh=_inside(mesh, job.scan, MESH), units=units) for job in jobs]
+        jobs = [replace(job, mesh=_inside(mesh, job.scan, MESH)) for job in jobs]
+    jobs = [replace(job, units=units) for job in jobs]
     _check_twins(jobs)
     check_apart(scans, [name for job in jobs for name in job.outputs])
     return jobs
@@ -186,7 +187,7 @@ def mesh_bytes(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
         return None, []
     from cylx.cli.batch.meshes import mesh_of
 
-    return mesh_of(job.mesh, content, job.units)
+    return mesh_of(job.mesh, content)
 
 
 def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> Written:
@@ -236,7 +237,7 @@ def _writers(
     def mesh(path: str | Path) -> None:
         from cylx.cli.batch.meshes import mesh_of
 
-        data, said = mesh_of(str(job.mesh), content, job.units)
+        data, said = mesh_of(str(job.mesh), content)
         remarks.extend(said)
         write_bytes(path, data or b"", overwrite=overwrite)
 

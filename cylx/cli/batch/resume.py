@@ -60,7 +60,7 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
             return None
         same = is_of_settings(result, settings) and result.input.is_of(selection)
         same = same and all(Path(name).is_file() for name in job.written(len(result.cylinders)))
-        same = same and _belong(job, result) and result.input.sha256 == sha256_of(job.scan)
+        same = same and _has_units(job, result) and _belong(job, result) and result.input.sha256 == sha256_of(job.scan)
     except (CylxError, OSError):
         return None
     return result if same else None
@@ -103,6 +103,13 @@ def is_of_settings(result: Result, settings: Config) -> bool:
     return resolve(settings, scene).model_dump(mode="json") == result.config
 
 
+def _has_units(job: Job, result: Result) -> bool:
+    """Return whether a result has the unit that is given, or that of its scan if that may say one."""
+    from cylx.io.formats import MAY_SAY_UNITS
+
+    return result.input.units == job.units or (job.units is None and result.input.format in MAY_SAY_UNITS)
+
+
 def _belong(job: Job, result: Result) -> bool:
     """Return whether the other outputs belong to this result and unit, as far as can be checked, and are whole."""
     from cylx.cli.batch.meshes import mesh_of
@@ -122,7 +129,7 @@ def _belong(job: Job, result: Result) -> bool:
             return False
     if job.mesh is None:
         return True
-    mesh, _ = mesh_of(job.mesh, result, job.units)
+    mesh, _ = mesh_of(job.mesh, result)
     file = Path(job.mesh)
     return (file.read_bytes() if file.is_file() else None) == mesh
 

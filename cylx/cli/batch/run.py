@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from cylx.cli.batch.annotated import check_format
 from cylx.cli.batch.jobs import Job, write_job
+from cylx.cli.batch.meshes import check_unit
 from cylx.cli.batch.outcomes import Finished, Outcome, check_finished, failed_outcome, failure_of
 from cylx.cli.options.tiles import NO_TILES, TileOptions
 from cylx.cli.terminal.failures import blamed_on
@@ -110,7 +111,8 @@ class Run:
         with self.messages.progress() as display:
             observer = Observers(Listener(), display, stopwatch)
             with observed(observer, "reading"):
-                cloud = select(read_cloud(job.scan, scan=self.selection.scan), self.selection)
+                cloud = select(read_cloud(job.scan, scan=self.selection.scan, units=job.units), self.selection)
+            check_unit(job.mesh, cloud.source.units)
             job, notes = check_format(job, cloud, overwrite=self.overwrite)
             compile_kernels(observer)
             extraction = extract_cylinders(cloud, self.settings, threads=self.threads, observer=observer)

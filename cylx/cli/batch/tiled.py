@@ -128,7 +128,7 @@ def plan_one_cloud(
     if mesh is not None and is_folder(mesh):
         mesh = str(Path(mesh) / (Path(name).name.removesuffix(RESULT) + MESH))
     first = replace(jobs[0], result=STREAM if stream else result, mesh=mesh, units=units)
-    return first, tuple(jobs[1:])
+    return first, tuple(replace(job, units=units) for job in jobs[1:])
 
 
 def extract_tiled(run: TiledRun, jobs: Sequence[Job]) -> Finished:
@@ -267,7 +267,7 @@ def _streamed(job: Job, spool: Path, run: TiledRun) -> StreamedCloud:
     """Open a file of the cloud, and check that its annotated cloud can be written."""
     from cylx.io import check_annotated, stream_cloud
 
-    cloud = stream_cloud(job.scan, spool, scan=run.selection.scan)
+    cloud = stream_cloud(job.scan, spool, scan=run.selection.scan, units=job.units)
     if job.annotated is not None:
         check_annotated(job.annotated, cloud.few(3))
     return cloud

@@ -127,6 +127,6 @@ _SELECTION: tuple[Callable[[Any], Any], ...] = (
         "scan_number",
         type=click.IntRange(min=0),
         metavar="N",
-        help="Read one scan of an E57 file; the first is 0.  [default: all]",
+        help="Read one scan of an E57 or PTX file; the first is 0.  [default: all]",
     ),
 )

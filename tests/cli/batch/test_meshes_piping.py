@@ -18,7 +18,7 @@ def test_the_mesh_beside_a_result_has_its_fittings(run_cylx, tmp_path):
     plain = Result.parse(json.loads(GOLDEN.read_text(encoding="utf-8")), "it")
     content = plain.model_copy(update={"cylinders": cylinders, "fittings": fittings, "runs": runs})
     (tmp_path / "r.json").write_text(content.to_json(), encoding="utf-8")
-    data, remarks = mesh_of("a.obj", content, None)
+    data, remarks = mesh_of("a.obj", content)
     assert remarks == []
     assert data is not None
     assert data.startswith(b"# 14 cylinders, 15 fittings\n")
