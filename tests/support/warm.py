@@ -14,7 +14,6 @@ import multiprocessing.connection
 import multiprocessing.context
 import os
 import pickle
-import signal
 import socket
 import subprocess
 import sys

@@ -1,7 +1,6 @@
 """Processes for tiles: a task whose process dies is done again, and given up in the end."""
 
 import os
-import signal
 from contextlib import closing
 from functools import partial
 
@@ -10,24 +9,7 @@ import pytest
 from cylx.cli.batch.tiled import Processes, options_of, processes_for
 from cylx.cli.options.tiles import TileOptions
 from cylx.errors import InputError, UsageError
-
-
-def die_once(folder, number):
-    """Kill the process at the first try of task 1."""
-    seen = folder / str(number)
-    if number == 1 and not seen.exists():
-        seen.touch()
-        os.kill(os.getpid(), signal.SIGTERM)
-    return 10 * number
-
-
-def always_die(number):
-    os.kill(os.getpid(), signal.SIGTERM)
-    return number
-
-
-def refuse(number):
-    raise UsageError("here", "no", "stop")
+from tests.support.tasks import always_die, die_once, refuse, tell, tell_otherwise
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs signals")
@@ -54,14 +36,6 @@ def test_it_is_given_up_in_the_end():
 def test_an_error_of_a_task_is_that_of_the_run():
     with closing(Processes(1, 1e6)) as pool, pytest.raises(UsageError, match=r"^here: no; stop$"):
         list(pool.run(refuse, [7], lambda: None))
-
-
-def tell(number):
-    return os.getpid()
-
-
-def tell_otherwise(number):
-    return -os.getpid()
 
 
 def test_all_steps_are_run_by_the_same_processes():
