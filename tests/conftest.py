@@ -7,6 +7,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+# otherwise each worker rewrites the assertions of all tests anew, and each process compiles the package; git ignores it
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", ""):
+    sys.dont_write_bytecode = False
+
 import pytest
 from click.testing import CliRunner
 from hypothesis import settings

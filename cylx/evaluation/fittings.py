@@ -19,6 +19,7 @@ PLACE_RADII = 1.0
 GOOD_BEND, GOOD_ANGLE_DEG = 0.05, 1.0
 """An elbow is well measured if its bend radius is off by no more than this share, and its angle by no more degrees."""
 _HALF_TURN = 1e-6  # ends that are so far from opposite each other, in bend radii, do not say where the middle is
+_SQUARABLE = 1e150  # numbers beyond it, or that are none, are no measures: their squares and shares overflow
 _BENDS = {"elbow": ("bend_radius", "angle_deg")}
 _SIZES = {"elbow": ("radius",), "reducer": ("start_radius", "end_radius")}
 
@@ -196,7 +197,7 @@ def _read_one(entry: Mapping[str, object], index: int, here: str, radii: Mapping
     if kind == "elbow":
         start, end, normal = (np.array(read_vector(entry, key, here)) for key in ("start", "end", "normal"))
         where = _middle_of_bend(where, start, end, normal)
-    if not np.isfinite([*bend, *sizes]).all():
+    if not all(abs(number) < _SQUARABLE for number in (*bend, *sizes)):
         where = np.full(3, np.nan)
     scale = np.nan if radii is None else _scale_of(entry, where, (*bend, *sizes), here, radii)
     own_id, ignore = read_id(entry.get("id", index), f"{here}.id"), bool(entry.get("ignore", False))

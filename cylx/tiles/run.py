@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -192,8 +193,9 @@ def _run(
     observer: Observer,
 ) -> None:
     """Run a step on all tiles or groups."""
-    with stage(observer, name, len(numbers)):
-        for _ in runner.run(partial(_done, work, plan), numbers, lambda: observer.stage_advanced(0)):
+    answers = runner.run(partial(_done, work, plan), numbers, lambda: observer.stage_advanced(0))
+    with stage(observer, name, len(numbers)), closing(answers):  # nobody works on after an error or Ctrl-C
+        for _ in answers:
             observer.stage_advanced(1)
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from typing import Any, Protocol
 
 from cylx.errors import InputError, UsageError
 from cylx.optional.extras import require
 
 Work = Callable[[int], int]
+Answers = Generator[tuple[int, int], None, None]
+"""The number and the answer of each task; closed, it stops those that are not done."""
 
 _CALLED = "10s"
 """How long a scheduler is called."""
@@ -20,14 +22,14 @@ _LOOK_UP = 1.0
 class Runner(Protocol):
     """Whoever runs tasks, in any order."""
 
-    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Iterator[tuple[int, int]]:
+    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Answers:
         """Yield the number and the answer of each task as it is done; `waited` is called now and then meanwhile."""
 
 
 class Here:
     """Runs one task after the other in this process."""
 
-    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Iterator[tuple[int, int]]:
+    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Answers:
         """Yield the number and the answer of each task."""
         for number in numbers:
             waited()
@@ -58,7 +60,7 @@ class Cluster:
             fault = f"does not answer: {' '.join(str(error).split())[:100]}"
             raise UsageError(f"--scheduler {address}", fault, "check its address, and that it runs") from None
 
-    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Iterator[tuple[int, int]]:
+    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Answers:
         """Yield the number and the answer of each task as it is done; a task whose worker dies is done by another."""
         from distributed import KilledWorker, wait  # noqa: PLC0415  an extra
 

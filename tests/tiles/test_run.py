@@ -63,7 +63,7 @@ def test_tiles_and_no_tiles_say_the_same(rng, tmp_path):
 
 def test_a_pipe_along_a_border(rng, tmp_path):
     along = ((0, 2.0, 0), (6, 2.0, 0), 0.15)
-    points = scene(rng, pipe(rng, *along, 6000), plane(rng, (0, 0, -0.6), (6, 4, -0.6), 4000))
+    points = scene(rng, pipe(rng, *along, 3000), plane(rng, (0, 0, -0.6), (6, 4, -0.6), 2000))
     extraction, *_ = in_tiles(points, tmp_path, size=2.0)
     assert found_exactly(extraction, along) == []
 
@@ -79,8 +79,8 @@ def test_pipes_that_cross_on_a_corner(rng, tmp_path):
 
 def test_a_tank_larger_than_a_tile(rng, tmp_path):
     tank, thin = ((3.5, 3.5, 0), (3.5, 3.5, 4), 2.0), ((0, 0, 1), (7, 0, 1), 0.1)
-    floor = plane(rng, (0, 0, 0), (7, 7, 0), 4000)
-    points = scene(rng, pipe(rng, *tank, 14000), pipe(rng, *thin, 5000), floor)
+    floor = plane(rng, (0, 0, 0), (7, 7, 0), 2000)
+    points = scene(rng, pipe(rng, *tank, 7000), pipe(rng, *thin, 2500), floor)
     extraction, *_ = in_tiles(points, tmp_path, size=2.0)
     assert evaluate(truth(tank, thin), document(extraction)).f1 == 1.0
     assert found_exactly(extraction, tank, thin) == []
@@ -113,13 +113,13 @@ def test_strays_far_away(rng, tmp_path):
 
 def test_the_number_of_points_cuts_where_they_are_dense(rng, tmp_path, monkeypatch):
     long, short = ((0, 0, 0), (8, 0, 0), 0.1), ((3, 0.8, 0), (4, 0.8, 0), 0.1)
-    points = scene(rng, pipe(rng, *long, 6000), pipe(rng, *short, 6000))
-    extraction, labels, _ = in_tiles(points, tmp_path, most=4000, monkeypatch=monkeypatch)
+    points = scene(rng, pipe(rng, *long, 3000), pipe(rng, *short, 3000))
+    extraction, labels, _ = in_tiles(points, tmp_path, most=2000, monkeypatch=monkeypatch)
     assert extraction.tiling.count >= 4
-    assert extraction.tiling.most_points <= 4000
+    assert extraction.tiling.most_points <= 2000
     assert extraction.tiling.size is None
     assert found_exactly(extraction, long, short) == []
-    again = in_tiles(points, tmp_path, most=4000, monkeypatch=monkeypatch)
+    again = in_tiles(points, tmp_path, most=2000, monkeypatch=monkeypatch)
     assert document(again[0]) == document(extraction)
     assert (again[1] == labels).all()
 

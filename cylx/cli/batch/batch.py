@@ -170,7 +170,8 @@ class Batch:
         run = replace(run, threads=run.threads or max(1, cores() // processes), processes=None)
 
         workers: Workers[Job, Outcome] = Workers(partial(attempt, run, _debug()), processes, self._tidy)
-        with closing(workers.run(jobs, [memory_needed(job.scan) for job in jobs])) as answers:
+        needs = [memory_needed(job.scan) for job in jobs]
+        with workers, closing(workers.run(jobs, needs)) as answers:
             for place, answer in answers:
                 yield place, lost_outcome(jobs[place], answer.exit_code) if isinstance(answer, Lost) else answer
 

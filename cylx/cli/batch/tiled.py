@@ -6,7 +6,6 @@ import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from cylx.io import Scratch, StreamedCloud
     from cylx.records import Selection
     from cylx.tiles.run import Options, Outcome
-    from cylx.tiles.schedule import Runner, Work
+    from cylx.tiles.schedule import Answers, Runner, Work
 
 OF_TILE, SHARE_OF_TILE = 1_000_000_000, 0.4
 """Memory for the search of one tile, bytes, or this share of what there is if that is less: two have room then."""
@@ -47,6 +46,13 @@ class TiledRun(NamedTuple):
     tiles: TileOptions
     processes: int | None
     resume: bool
+
+
+class Task(NamedTuple):
+    """What a process is sent: what is done to a tile or a group, and its number."""
+
+    work: Work
+    number: int
 
 
 class Answer(NamedTuple):
@@ -213,12 +219,15 @@ def runner_of(tiles: TileOptions, processes: int | None, memory: float) -> Itera
     if tiles.scheduler is not None:
         with closing(Cluster(tiles.scheduler)) as cluster:
             yield cluster
+    elif processes is None:
+        yield Here()
     else:
-        yield Here() if processes is None else Processes(processes_for(tiles, processes, memory), memory)
+        with closing(Processes(processes_for(tiles, processes, memory), memory)) as pool:
+            yield pool
 
 
 class Processes:
-    """Runs tasks in processes of this machine; a task whose process dies is done again by another one.
+    """Runs tasks in processes of this machine, the same ones for all steps; a task whose process dies is done again.
 
     Parameters
     ----------
@@ -228,39 +237,44 @@ class Processes:
     """
 
     def __init__(self, count: int, memory: float) -> None:
-        self.count = count
-        self.memory = int(memory)
+        from cylx.cli.batch.workers import Workers
 
-    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Iterator[tuple[int, int]]:
+        self.memory = int(memory)
+        self._pool: Workers[Task, Answer] = Workers(attempt, count, lambda _: None)
+
+    def run(self, work: Work, numbers: Sequence[int], waited: Callable[[], None]) -> Answers:
         """Yield the number and the answer of each task as it is done."""
-        from cylx.cli.batch.workers import Lost, Workers
+        from cylx.cli.batch.workers import Lost
 
         left, deaths = list(numbers), 0
         while left:
-            pool: Workers[int, Answer] = Workers(partial(attempt, work), min(self.count, len(left)), lambda _: None)
-            tasks, lost = list(left), []
-            with closing(pool.run(tasks, [self.memory] * len(tasks), waited)) as answers:
+            tasks, lost = [Task(work, number) for number in left], []
+            with closing(self._pool.run(tasks, [self.memory] * len(tasks), waited)) as answers:
                 for place, answer in answers:
                     if isinstance(answer, Lost):
-                        lost.append(tasks[place])
+                        lost.append(left[place])
                         continue
                     if answer.failure is not None:
                         raise answer.failure
                     deaths = 0
-                    yield tasks[place], answer.value
+                    yield left[place], answer.value
             left = lost
             deaths += bool(lost)
             if deaths >= MOST_DEATHS:
                 fault = f"the process that works on it was killed {deaths} times, as when memory runs out"
                 raise InputError(f"tile {lost[0]}", fault, "give less by --memory, or fewer --jobs")
 
+    def close(self) -> None:
+        """End the processes."""
+        self._pool.close()
 
-def attempt(work: Work, number: int) -> Answer:
+
+def attempt(task: Task) -> Answer:
     """Do a task in a process of its own."""
     try:
-        return Answer(work(number), None)
+        return Answer(task.work(task.number), None)
     except CylxError as failure:
-        return Answer(number, failure)
+        return Answer(task.number, failure)
 
 
 def _streamed(job: Job, spool: Path, run: TiledRun) -> StreamedCloud:

@@ -1,7 +1,7 @@
 """Worker processes with one task each, started as memory allows; if one is killed, only its task is lost.
 
-They are spawned, not forked, and do not receive Ctrl-C. The parent ends them; if the parent dies, they end by
-themselves.
+They stay for the next tasks until the pool is closed, as a start takes as long as a small task. They are spawned, not
+forked, and do not receive Ctrl-C. The parent ends them; if the parent dies, they end by themselves.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Lost(NamedTuple):
 
 
 class Workers(Generic[Task, Answer]):
-    """A pool of processes.
+    """A pool of processes; as a context manager it ends them.
 
     Parameters
     ----------
@@ -64,10 +64,16 @@ class Workers(Generic[Task, Answer]):
         self._idle: list[_Worker] = []
         self._busy: dict[int, _Worker] = {}
 
+    def __enter__(self) -> Workers[Task, Answer]:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
     def run(
         self, tasks: Sequence[Task], needs: Sequence[int], waited: Callable[[], None] = lambda: None
     ) -> Generator[tuple[int, Answer | Lost], None, None]:
-        """Run all tasks; they are started in their order.
+        """Run all tasks; they are started in their order. Those that are not done are stopped if it is closed.
 
         Parameters
         ----------
@@ -96,7 +102,7 @@ class Workers(Generic[Task, Answer]):
                 for index in [index for index, worker in self._busy.items() if worker.pipe in ready]:
                     yield index, self._take(index)
         finally:
-            self._end()
+            self._stop_busy()
 
     def _fits(self, index: int, needs: Sequence[int]) -> bool:
         """Return whether memory allows another task beside the running ones; the first task always starts."""
@@ -153,13 +159,22 @@ class Workers(Generic[Task, Answer]):
         self._idle.append(worker)
         return answer
 
-    def _end(self) -> None:
-        """End all processes: ask the busy ones to stop, and kill those that do not."""
+    def close(self) -> None:
+        """End all processes."""
+        self._stop_busy()
+        for worker in self._idle:
+            worker.pipe.close()  # all of them, so that they end at the same time
+        for worker in self._idle:
+            self._part(worker)
+        self._idle = []
+
+    def _stop_busy(self) -> None:
+        """End the processes that are at work: ask them to stop, and kill those that do not."""
         for worker in self._busy.values():
             worker.process.terminate()
-        for worker in (*self._busy.values(), *self._idle):
+        for worker in self._busy.values():
             self._part(worker)
-        self._busy, self._idle = {}, []
+        self._busy = {}
 
     def _part(self, worker: _Worker) -> None:
         worker.pipe.close()

@@ -70,8 +70,8 @@ class Classes(ClassesType):
         """Parse the numbers."""
         if isinstance(value, tuple):
             return value
-        parts = str(value).split(",")
-        if not all(_CLASS.fullmatch(part.strip()) for part in parts):
+        parts = [part.strip() for part in str(value).split(",")]  # of more kinds of blanks than `int` takes
+        if not all(_CLASS.fullmatch(part) for part in parts):
             self.fail(f"'{value}' is not a list of class numbers such as 2,6", param, ctx)
         return tuple(int(part) for part in parts)
 

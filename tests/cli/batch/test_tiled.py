@@ -1,7 +1,7 @@
 """Processes for tiles: a task whose process dies is done again, and given up in the end."""
 
 import os
-import signal
+from contextlib import closing
 from functools import partial
 
 import pytest
@@ -9,43 +9,39 @@ import pytest
 from cylx.cli.batch.tiled import Processes, options_of, processes_for
 from cylx.cli.options.tiles import TileOptions
 from cylx.errors import InputError, UsageError
-
-
-def die_once(folder, number):
-    """Kill the process at the first try of task 1."""
-    seen = folder / str(number)
-    if number == 1 and not seen.exists():
-        seen.touch()
-        os.kill(os.getpid(), signal.SIGTERM)
-    return 10 * number
-
-
-def always_die(number):
-    os.kill(os.getpid(), signal.SIGTERM)
-    return number
-
-
-def refuse(number):
-    raise UsageError("here", "no", "stop")
+from tests.support.tasks import always_die, die_once, refuse, tell, tell_otherwise
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs signals")
 def test_a_task_whose_process_dies_is_done_again(tmp_path):
     calls = []
-    answers = Processes(2, 1e6).run(partial(die_once, tmp_path), [0, 1, 2], lambda: calls.append(1))
-    assert sorted(answers) == [(0, 0), (1, 10), (2, 20)]
+    with closing(Processes(2, 1e6)) as pool:
+        assert sorted(pool.run(partial(die_once, tmp_path), [0, 1, 2], lambda: calls.append(1))) == [
+            (0, 0),
+            (1, 10),
+            (2, 20),
+        ]
     assert calls
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs signals")
 def test_it_is_given_up_in_the_end():
-    with pytest.raises(InputError, match=r"^tile 7: the process that works on it was killed 3 times"):
-        list(Processes(1, 1e6).run(always_die, [7], lambda: None))
+    with (
+        closing(Processes(1, 1e6)) as pool,
+        pytest.raises(InputError, match=r"^tile 7: the process that works on it was killed 3 times"),
+    ):
+        list(pool.run(always_die, [7], lambda: None))
 
 
 def test_an_error_of_a_task_is_that_of_the_run():
-    with pytest.raises(UsageError, match=r"^here: no; stop$"):
-        list(Processes(1, 1e6).run(refuse, [7], lambda: None))
+    with closing(Processes(1, 1e6)) as pool, pytest.raises(UsageError, match=r"^here: no; stop$"):
+        list(pool.run(refuse, [7], lambda: None))
+
+
+def test_all_steps_are_run_by_the_same_processes():
+    with closing(Processes(1, 1e6)) as pool:
+        (first,), (second,) = (list(pool.run(work, [0], lambda: None)) for work in (tell, tell_otherwise))
+    assert first[1] == -second[1] != os.getpid()
 
 
 def test_tiles_do_not_depend_on_the_number_of_processes():

@@ -121,7 +121,8 @@ def test_what_was_killed_goes_on_to_the_same_bytes(place, whole, started):
 
 
 def outcome(tasks, most=2, after_death=lambda process: None, needs=None):
-    return dict(Workers(eval, most, after_death).run(tasks, needs or [0] * len(tasks)))
+    with Workers(eval, most, after_death) as pool:
+        return dict(pool.run(tasks, needs or [0] * len(tasks)))
 
 
 @POSIX
@@ -152,13 +153,21 @@ def test_memory_decides_how_many_work_at_once(monkeypatch, available, needs, mos
 
 
 def test_those_that_are_no_longer_needed_end():
-    answers = Workers(eval, 2, lambda process: None)
-    running = answers.run(["1", "__import__('time').sleep(6000)"], [0, 0])
+    pool = Workers(eval, 2, lambda process: None)
+    running = pool.run(["1", "__import__('time').sleep(6000)"], [0, 0])
     assert next(running) == (0, 1)
-    pids = [worker.pid for worker in (*answers._busy.values(), *answers._idle)]
-    assert len(pids) == 2
+    (busy,), (idle,) = [[worker.pid for worker in some] for some in (pool._busy.values(), pool._idle)]
     running.close()  # and does not wait until they have done their work
-    assert not any(memory.memory_held(pid) for pid in pids)
+    assert not memory.memory_held(busy)
+    pool.close()
+    assert not memory.memory_held(idle)
+
+
+def test_processes_stay_for_the_next_tasks():
+    with Workers(eval, 2, lambda process: None) as pool:
+        first, second = ({pid for _, pid in pool.run(["__import__('os').getpid()"] * 3, [0] * 3)} for _ in range(2))
+    assert 1 <= len(first | second) <= 2
+    assert not any(memory.memory_held(pid) for pid in first | second)
 
 
 def test_memory_is_told_or_unknown():
