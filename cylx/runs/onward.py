@@ -10,8 +10,8 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import Bend
+from cylx.runs.bend_evidence import FittedBend, judged
 from cylx.runs.bend_fit import Solved, refined
-from cylx.runs.bending import FittedBend, judged
 from cylx.runs.elbows import add_bends, add_fitted
 from cylx.runs.narrowing import narrowed
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
