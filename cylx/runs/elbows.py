@@ -13,8 +13,8 @@ from cylx.runs.bend_evidence import FittedBend
 from cylx.runs.bend_fit import bend_of
 from cylx.runs.bending import NEARBY, fit_meeting, gap_before, is_loose
 from cylx.runs.meetings import Meeting, meetings
-from cylx.runs.pieces import OTHER_RADIUS, refit
 from cylx.runs.pipes import End, Pipe, Surroundings, axis_change, tilted
+from cylx.runs.refitting import OTHER_RADIUS, refit
 from cylx.runs.tracing import BY_AXES, Trace, trust
 
 SHORT, LOOSE_OFFSET, LOOSE_TILT = 4.0, 0.1, 0.05

@@ -11,8 +11,8 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
-from cylx.runs.pieces import is_borne_out, refit
 from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings, turned
+from cylx.runs.refitting import is_borne_out, refit
 
 RATIOS = (0.45, 0.55, 0.65, 0.73, 0.8, 0.87, 1.15, 1.25, 1.37, 1.53, 1.8, 2.2)
 """Radii of the pipe behind the reducer that are tried, in those of the pipe before it."""
