@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from cylx.records import Cap, Cross, Fitting, Flange, Inline, Joint, Junction, Reducer
 from cylx.runs.caps import fit_cap
-from cylx.runs.collars import Collar, collars_of
+from cylx.runs.collars import LONGEST_INLINE, Collar, collars_of
 from cylx.runs.crossings import equal_crossings
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
-from cylx.runs.pipes import ENDS, Surroundings
+from cylx.runs.pipes import ENDS, End, Surroundings
 from cylx.runs.tracing import BY_AXES, Trace, trust
 
 THROUGH = 0.9
@@ -172,15 +173,41 @@ def _add_collar(trace: Trace, index: int, collar: Collar) -> None:
 
 def add_gaps(trace: Trace, near: Surroundings) -> int:
     """Add what bridges gaps between ends of one size; return their number."""
+    flanged = {key for key, k in trace.taken.items() if isinstance(trace.fittings[k], Flange)}
     pairs = sorted(
-        (one for one in facing_ends(trace.pipes, trace.closed) if one.same_size), key=lambda one: abs(one.gap)
+        (one for one in facing_ends(trace.pipes, trace.closed - flanged) if one.same_size), key=lambda one: abs(one.gap)
     )
     count = 0
+    joined: set[tuple[int, End]] = set()
     for one in pairs:
-        if trace.is_free(zip(one.pipes, one.ends, strict=True)):
-            _add_gap(trace, one, near)
-            count += 1
+        keys = set(zip(one.pipes, one.ends, strict=True))
+        if keys & joined or not trace.is_free(keys - flanged):
+            continue
+        if keys & flanged:
+            if one.gap > LONGEST_INLINE * max(_flange_at(trace, key).radius for key in keys & flanged):
+                continue
+            for key in keys & flanged:
+                _carry_on(trace, key)
+        _add_gap(trace, one, near)
+        joined |= keys
+        count += 1
     return count
+
+
+def _flange_at(trace: Trace, key: tuple[int, End]) -> Flange:
+    fitting = trace.fittings[trace.taken[key]]
+    assert isinstance(fitting, Flange)
+    return fitting
+
+
+def _carry_on(trace: Trace, key: tuple[int, End]) -> None:
+    """Let a pipe go on through the flange at an end of it, as something is beyond."""
+    flange, (index, end) = _flange_at(trace, key), key
+    trace.fittings[trace.taken.pop(key)] = replace(flange, ends=("side",), pair=True)
+    pipe = trace.pipes[index]
+    face = flange.center + 0.5 * flange.thickness * pipe.outward(end)
+    if float((face - pipe.at(end)) @ pipe.outward(end)) > 0.0:
+        trace.pipes[index] = pipe.with_end(end, face)
 
 
 def _add_gap(trace: Trace, one: Facing, near: Surroundings) -> None:

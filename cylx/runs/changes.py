@@ -1,4 +1,4 @@
-"""Where along a pipe its circle changes: two pipes of one line, such as those of a flat reducer, may be taken for one."""
+"""Where along a pipe its circle changes: two pipes of one line, as those of a flat reducer, may be taken for one."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LEAST_SIDE = 3.0
 LEAST_CHANGE = 0.08
 """The radii of two nominal sizes differ by more, in the smaller."""
 _STRIDES = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703)
-"""Steps of a sequence that fills a cube evenly (R3, Roberts 2018): three points of each circle, the same in each run."""
+"""Steps of a sequence that fills a cube evenly (R3, Roberts 2018): three points of each circle, always the same."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

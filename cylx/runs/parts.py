@@ -8,14 +8,14 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Elbow, Flange, Inline, Junction
-from cylx.runs.pipes import Pipe
+from cylx.runs.pipes import ENDS, Pipe
 from cylx.runs.tracing import Trace
 from cylx.runs.wider import LONGEST_RIM
 
 WITHIN = 0.5
 """A piece of an elbow that was found as a cylinder has its axis within so many radii of the centre line."""
-LEAST_LEFT, LEAST_POINTS = 0.7, 8
-"""A pipe that was found along a run has a length of so many radii, and so many points, in the end."""
+LEAST_LEFT, LEAST_ALONE, LEAST_POINTS = 0.7, 6.0, 8
+"""A pipe that was found along a run has a length of so many radii, if nothing joins it any more, and so many points."""
 
 
 def drop_parts(trace: Trace) -> Trace:
@@ -38,7 +38,7 @@ def drop_parts(trace: Trace) -> Trace:
     for fitting in trace.fittings:
         if isinstance(fitting, Elbow) and fitting.bend_radius > 0:
             parts |= {k for k, pipe in enumerate(trace.pipes) if k not in joined and _is_within(pipe, fitting)}
-    parts |= {k for k, pipe in enumerate(trace.pipes) if _is_remnant(pipe, trace)}
+    parts |= {k for k in range(len(trace.pipes)) if _is_remnant(k, trace, k not in joined)}
     kept = [k for k in range(len(trace.pipes)) if k not in parts]
     number = {old: new for new, old in enumerate(kept)}
     near = trace.near
@@ -70,11 +70,17 @@ def _is_within(pipe: Pipe, elbow: Elbow) -> bool:
     return bool(on.all() and (turn > -slack).all() and (turn < elbow.angle + slack).all())
 
 
-def _is_remnant(pipe: Pipe, trace: Trace) -> bool:
-    """Return whether of a pipe that was found along a run hardly anything is left between its fittings."""
+def _is_remnant(index: int, trace: Trace, alone: bool) -> bool:
+    """Return whether hardly anything is left of a pipe that was found along a run; `alone` if nothing joins it."""
+    pipe = trace.pipes[index]
     if pipe.source is not None:
         return False
-    return pipe.length < LEAST_LEFT * pipe.radius or len(trace.near.on(pipe)) < LEAST_POINTS
+    # hardly more than a weld between a bend and a bend or a reducer is a pipe that joins them
+    at = [trace.fittings[trace.taken[index, end]].kind for end in ENDS if (index, end) in trace.taken]
+    if sorted(at) in (["elbow", "elbow"], ["elbow", "reducer"]):
+        return False
+    least = LEAST_ALONE if alone else LEAST_LEFT
+    return pipe.length < least * pipe.radius or len(trace.near.on(pipe)) < LEAST_POINTS
 
 
 _OF_ONE = ("cap", "flange", "inline")
