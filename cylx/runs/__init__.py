@@ -22,6 +22,7 @@ from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.roughness import is_rough
 from cylx.runs.tracing import Trace
+from cylx.runs.usual_bends import settle_radii
 
 __all__ = ["Traced", "trace_runs"]
 
@@ -87,6 +88,7 @@ def trace_runs(
     add_bends(trace, near)
     add_reducers(trace, near)
     add_assumed(trace, near)
+    settle_radii(trace)
     trace = in_order(trace)
     runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)
     return answer_of(trace, runs, fits, near)
