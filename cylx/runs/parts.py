@@ -12,6 +12,8 @@ from cylx.runs.pipes import ENDS, Pipe
 from cylx.runs.tracing import Trace
 from cylx.runs.wider import LONGEST_RIM
 
+MID_CONE = 1.5
+"""A pipe between a wider and a narrower one is longer, in its radii; what is shorter is a piece of a reducer."""
 WITHIN = 0.5
 """A piece of an elbow that was found as a cylinder has its axis within so many radii of the centre line."""
 LEAST_LEFT, LEAST_ALONE, LEAST_POINTS = 0.7, 6.0, 8
@@ -71,13 +73,19 @@ def _is_within(pipe: Pipe, elbow: Elbow) -> bool:
 
 
 def _is_remnant(index: int, trace: Trace, alone: bool) -> bool:
-    """Return whether hardly anything is left of a pipe that was found along a run; `alone` if nothing joins it."""
+    """Return whether hardly anything is left of a pipe that was found along a run; `alone` if nothing joins it.
+
+    Or whether it is a piece of one cone that was taken for a pipe between two.
+    """
     pipe = trace.pipes[index]
-    if pipe.source is not None:
-        return False
+    fittings = [trace.fittings[trace.taken[index, end]] for end in ENDS if (index, end) in trace.taken]
+    at = sorted(one.kind for one in fittings)
+    if at == ["reducer", "reducer"] and pipe.length < MID_CONE * pipe.radius:
+        radii = sorted(trace.pipes[k].radius for one in fittings for k in one.joins if k != index)
+        if radii[0] < pipe.radius < radii[-1]:
+            return True
     # hardly more than a weld between a bend and a bend or a reducer is a pipe that joins them
-    at = [trace.fittings[trace.taken[index, end]].kind for end in ENDS if (index, end) in trace.taken]
-    if sorted(at) in (["elbow", "elbow"], ["elbow", "reducer"]):
+    if pipe.source is not None or at in (["elbow", "elbow"], ["elbow", "reducer"]):
         return False
     least = LEAST_ALONE if alone else LEAST_LEFT
     return pipe.length < least * pipe.radius or len(trace.near.on(pipe)) < LEAST_POINTS
