@@ -1,14 +1,10 @@
-"""Links that are hardly seen, or not at all: bends that are missing, slight ones, pipes of one line taken for one."""
+"""Links that are hardly seen, or not at all: bends that are missing, slight ones, and pieces no longer than a weld."""
 
 import math
 
-import numpy as np
 import pytest
 
-from cylx.runs.changes import changed
-from cylx.runs.pipes import Pipe
-from cylx.runs.usual_bends import Usual, posterior
-from tests.support.pipework import NOISE, Pipework, X, Y, fit_of, of_kind
+from tests.support.pipework import Pipework, X, Y, of_kind
 
 R = 0.05
 
@@ -65,50 +61,3 @@ def test_a_pipe_hardly_longer_than_a_weld_joins_an_elbow_and_a_reducer():
     traced = work.traced()
     assert sorted(one.kind for one in traced.piping.fittings) == ["elbow", "reducer"]
     assert len(traced.piping.runs) == 1
-
-
-def flat_reducer(other):
-    """Points of two pipes that are flush at the bottom, seen from there, and one cylinder over both."""
-    work = Pipework(seen=0.5)
-    work.pipe([-1, 0, 0], [0, 0, 0], R, known=False)
-    work.cone([0.1, 0, other - R], [1.1, 0, other - R], other, other)
-    pipe = Pipe.of(0, fit_of([-1, 0, 0], [1.1, 0, 0], R), np.zeros(3), NOISE)
-    return changed(pipe, np.concatenate(work.points))
-
-
-def test_two_pipes_of_a_flat_reducer_are_told_apart():
-    found = flat_reducer(0.035)
-    assert found is not None
-    assert sorted(one.radius for one in found) == pytest.approx([0.035, R], rel=0.03)
-    places = sorted(float(x) for one in found for x in (one.start[0], one.end[0]))
-    assert places[0] == pytest.approx(-1, abs=0.02)
-    assert -0.15 < places[1] <= places[2] < 0.3
-
-
-def test_one_pipe_is_not_told_apart():
-    assert flat_reducer(R) is None
-
-
-def test_a_bend_radius_that_points_tell_stays_and_one_that_they_leave_open_is_a_usual_one():
-    usual = [Usual(0.15, 0.005, 0.75)]
-    radius, std = posterior(0.151, 0.0005, R, usual)
-    assert radius == pytest.approx(0.151, abs=0.0003)
-    assert std <= 0.00055
-    radius, std = posterior(0.17, 0.02, R, usual)
-    assert abs(radius - 0.15) < 0.006
-    assert 0.004 < std < 0.02
-    # what contradicts all usual radii is what it is
-    radius, std = posterior(0.25, 0.01, R, usual)
-    assert radius == pytest.approx(0.25, abs=0.002)
-    assert std == pytest.approx(0.01, rel=0.2)
-
-
-def test_a_tee_is_told_by_the_points_about_its_saddle():
-    work = Pipework()
-    work.pipe([-1, 0, 0], [1, 0, 0], R)
-    work.pipe([0, R, 0], [0, 1, 0], 0.03)
-    (tee,) = of_kind(work.traced(), "tee")
-    assert tee.inliers > 25
-    assert tee.rms == pytest.approx(NOISE, rel=0.3)
-    assert tee.coverage > 0.6
-    assert tee.confidence > 0.8
