@@ -104,6 +104,37 @@ def passed_through(
     return passed
 
 
+def in_line_on_ignored(known: CylinderTable, found: CylinderTable, admissible: MaskArray) -> MaskArray:
+    """Return which found cylinders are on a true one that need not be found, and only in line with others.
+
+    Limits of angle, offset and radius do not say where along its axis a cylinder is: behind a reducer of one step there
+    is another pipe in line.
+
+    Parameters
+    ----------
+    known, found : CylinderTable
+        The truth and the result.
+    admissible : ndarray of shape (known, found), bool
+        Which pairs are near enough.
+
+    Returns
+    -------
+    on_ignored : ndarray of shape (found,), bool
+        Those whose middle is between the ends of an ignored true one, and of no other that is near enough.
+    """
+    out = np.zeros(len(found), dtype=bool)
+    for j in np.flatnonzero(admissible[known.ignore].any(axis=0)):
+        between = [int(i) for i in np.flatnonzero(admissible[:, j]) if _holds_middle(known, int(i), found, int(j))]
+        out[j] = bool(between) and all(bool(known.ignore[i]) for i in between)
+    return out
+
+
+def _holds_middle(known: CylinderTable, i: int, found: CylinderTable, j: int) -> bool:
+    """Return whether the middle of a found cylinder is between the ends of a true one; false if these are unknown."""
+    low, high = _stretch(known, i, found, j)
+    return abs(0.5 * (low + high)) <= 0.5 * float(known.heights[i])
+
+
 def _stretch(known: CylinderTable, i: int, found: CylinderTable, j: int) -> tuple[float, float]:
     """Return from where to where a found cylinder reaches along a true one's axis; NaN if its height is unknown."""
     middle = float((found.points[j] - known.points[i]) @ known.directions[i])

@@ -10,7 +10,7 @@ import numpy as np
 from cylx.errors import UsageError
 from cylx.evaluation.fittings import FittingScores, score_fittings
 from cylx.evaluation.matching import match_one_to_one, pair_errors, read_cylinders, require_usable
-from cylx.evaluation.pieces import further_pieces, passed_through, read_pieces
+from cylx.evaluation.pieces import further_pieces, in_line_on_ignored, passed_through, read_pieces
 from cylx.evaluation.rates import Spread, rates, spread_of
 from cylx.evaluation.runs import RunScore, score_runs
 from cylx.geometry.arrays import MaskArray
@@ -48,7 +48,8 @@ class Evaluation:
     truth, predicted, matched : int
         Number of true cylinders that must be found, of cylinders in the result, and of matched pairs.
     duplicates : int
-        Further cylinders of the result on a true one that is matched already; they count as false.
+        Further cylinders of the result on a true one that is matched already; they count as false. One in line with
+        it that is on a true one that need not be found is none.
     ignored : int
         Cylinders of the result on true ones that need not be found, and further pieces of a true one that something
         interrupts; they count neither as correct nor as false.
@@ -151,7 +152,7 @@ def evaluate(
     further = further_pieces(known, found, pieces, near, on_true)
     on_true |= further
     unmatched[list(further)] = False
-    duplicate = unmatched & admissible[asked].any(axis=0)
+    duplicate = unmatched & admissible[asked].any(axis=0) & ~in_line_on_ignored(known, found, admissible)
     ignored = unmatched & ~duplicate & admissible[known.ignore].any(axis=0)
     missed = asked.copy()
     missed[rows] = False

@@ -193,7 +193,7 @@ class Cap(Fitting):
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Joint(Fitting):
-    """A gap that is bridged: both cylinders point at each other, and nothing is seen of what is between them.
+    """A gap that is bridged: nothing is seen of what is between two cylinders of one line, or of one bend.
 
     Parameters
     ----------

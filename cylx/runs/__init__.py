@@ -12,6 +12,7 @@ from cylx.geometry.arrays import FloatArray
 from cylx.records import CylinderFit
 from cylx.runs.adding import add_caps, add_collars, add_gaps, add_junctions, add_reducers
 from cylx.runs.answer import Traced, answer_of, in_order
+from cylx.runs.assumed import add_assumed
 from cylx.runs.crossings import split_crossings
 from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
@@ -21,6 +22,7 @@ from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.roughness import is_rough
 from cylx.runs.tracing import Trace
+from cylx.runs.usual_bends import settle_radii
 
 __all__ = ["Traced", "trace_runs"]
 
@@ -85,6 +87,8 @@ def trace_runs(
     # a bend that was taken for two has both its pipes again
     add_bends(trace, near)
     add_reducers(trace, near)
+    add_assumed(trace, near)
+    settle_radii(trace)
     trace = in_order(trace)
     runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)
     return answer_of(trace, runs, fits, near)

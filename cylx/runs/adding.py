@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
+from cylx.geometry.arrays import FloatArray
 from cylx.records import Cap, Cross, Fitting, Flange, Inline, Joint, Junction, Reducer
 from cylx.runs.caps import fit_cap
-from cylx.runs.collars import Collar, collars_of
+from cylx.runs.collars import LONGEST_INLINE, Collar, collars_of
 from cylx.runs.crossings import equal_crossings
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
-from cylx.runs.pipes import ENDS, Surroundings
+from cylx.runs.pipes import ENDS, End, Surroundings, sectors_of
+from cylx.runs.saddles import saddle_of
 from cylx.runs.tracing import BY_AXES, Trace, trust
 
 THROUGH = 0.9
 """Confidence of a cross of two pipes of one radius that go through each other."""
+PIECES, SECTORS = 6, 12
+"""Pieces along a gap and sectors about it in which points are counted."""
 CROSSING = 0.5
 """Branches that face each other meet the main within so many of its radii of each other."""
 
@@ -106,12 +111,20 @@ def _add_junction(trace: Trace, group: list[Branching], near: Surroundings) -> N
     for one in group:
         if one.gap < 0:
             trace.pipes[one.branch] = trace.pipes[one.branch].with_end(one.end, one.surface)
+    seen = [saddle for saddle in (saddle_of(one, trace.pipes, near) for one in group) if saddle is not None]
     contact = 1.0 / (1.0 + max(0.0, first.gap / trace.pipes[first.branch].radius - 1.0))
+    inliers = sum(one.inliers for one in seen)
+    coverage = sum(one.coverage for one in seen) / max(len(seen), 1)
+    filled = max((one.filled for one in seen), default=0.0)
+    by_points = trust(inliers, coverage, filled) if seen else contact
     kind = Junction if len(group) == 1 else Cross
     fitting = kind(
         joins=(first.main, *branches),
         ends=("side", *(one.end for one in group)),
-        confidence=0.6 + 0.35 * contact,
+        confidence=BY_AXES + (0.95 - BY_AXES) * contact * by_points,
+        inliers=inliers,
+        rms=math.sqrt(sum(one.inliers * one.rms**2 for one in seen) / max(inliers, 1)),
+        coverage=coverage,
         center=first.center,
         main=(first.main,),
         branches=branches,
@@ -172,15 +185,41 @@ def _add_collar(trace: Trace, index: int, collar: Collar) -> None:
 
 def add_gaps(trace: Trace, near: Surroundings) -> int:
     """Add what bridges gaps between ends of one size; return their number."""
+    flanged = {key for key, k in trace.taken.items() if isinstance(trace.fittings[k], Flange)}
     pairs = sorted(
-        (one for one in facing_ends(trace.pipes, trace.closed) if one.same_size), key=lambda one: abs(one.gap)
+        (one for one in facing_ends(trace.pipes, trace.closed - flanged) if one.same_size), key=lambda one: abs(one.gap)
     )
     count = 0
+    joined: set[tuple[int, End]] = set()
     for one in pairs:
-        if trace.is_free(zip(one.pipes, one.ends, strict=True)):
-            _add_gap(trace, one, near)
-            count += 1
+        keys = set(zip(one.pipes, one.ends, strict=True))
+        if keys & joined or not trace.is_free(keys - flanged):
+            continue
+        if keys & flanged:
+            if one.gap > LONGEST_INLINE * max(_flange_at(trace, key).radius for key in keys & flanged):
+                continue
+            for key in keys & flanged:
+                _carry_on(trace, key)
+        _add_gap(trace, one, near)
+        joined |= keys
+        count += 1
     return count
+
+
+def _flange_at(trace: Trace, key: tuple[int, End]) -> Flange:
+    fitting = trace.fittings[trace.taken[key]]
+    assert isinstance(fitting, Flange)
+    return fitting
+
+
+def _carry_on(trace: Trace, key: tuple[int, End]) -> None:
+    """Let a pipe go on through the flange at an end of it, as something is beyond."""
+    flange, (index, end) = _flange_at(trace, key), key
+    trace.fittings[trace.taken.pop(key)] = replace(flange, ends=("side",), pair=True)
+    pipe = trace.pipes[index]
+    face = flange.center + 0.5 * flange.thickness * pipe.outward(end)
+    if float((face - pipe.at(end)) @ pipe.outward(end)) > 0.0:
+        trace.pipes[index] = pipe.with_end(end, face)
 
 
 def _add_gap(trace: Trace, one: Facing, near: Surroundings) -> None:
@@ -191,8 +230,15 @@ def _add_gap(trace: Trace, one: Facing, near: Surroundings) -> None:
     inner = inner[near.free(inner)]
     tube = near.about(start, axis, 0.0, max(one.gap, 0.0), 1.1 * radius, 0.9 * radius)
     if len(inner) > 0.5 * near.density(first) * 2 * np.pi * radius * max(one.gap, 0.0) and len(inner) > 20:
+        lengthwise, round_about = _spread_of(near.points[inner], start, axis, one.gap)
         fitting: Fitting = Inline(
-            joins=one.pipes, ends=one.ends, confidence=0.6, inliers=len(inner), start=start, end=end
+            joins=one.pipes,
+            ends=one.ends,
+            confidence=trust(len(inner), lengthwise) * (0.5 + 0.5 * min(1.0, 2.0 * round_about)),
+            inliers=len(inner),
+            coverage=round_about,
+            start=start,
+            end=end,
         )
         trace.add(fitting, inner)
         return
@@ -206,6 +252,14 @@ def _add_gap(trace: Trace, one: Facing, near: Surroundings) -> None:
         assumed=len(tube) < 10 and one.gap > radius,
     )
     trace.add(fitting, np.empty(0, np.int64))
+
+
+def _spread_of(points: FloatArray, start: FloatArray, axis: FloatArray, gap: float) -> tuple[float, float]:
+    """Return in what share of the pieces of a gap there are points, and in what share of the sectors about it."""
+    heights = np.clip(((points - start) @ axis) / gap, 0.1, 0.899999)
+    rows = ((heights - 0.1) / 0.8 * PIECES).astype(np.int64)
+    sectors = sectors_of(points, start, axis, SECTORS)
+    return len(np.unique(rows)) / PIECES, len(np.unique(sectors)) / SECTORS
 
 
 def add_caps(trace: Trace, near: Surroundings) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cylx.geometry.arc import arc_coordinates
 from cylx.geometry.arrays import FloatArray
 
 LEAST_TURN = math.radians(3.0)
@@ -94,24 +95,10 @@ class Bend:
         distances : ndarray of shape (N,)
         """
         angle, radius, first, second = self.angle, self.bend_radius, self.first, self.second
-        normal = np.array(_cross(first, second))
-        normal /= math.sqrt(float(normal @ normal))
+        across = np.array(_cross(first, second))
+        normal = across / math.sqrt(float(across @ across))
         inward = np.array(_cross(normal, first))
         tangent = radius * math.tan(0.5 * angle)
         start, end = self.meeting - tangent * first, self.meeting + tangent * second
-        x, y, z = np.column_stack([first, -inward, normal]).T @ (points - (start + radius * inward)).T
-        out = np.hypot(x, y)
-        # the middle of the arc is at zero, so that what lies behind the centre is cut in half
-        turn = np.arctan2(x, y) - 0.5 * angle
-        turn = np.where(turn > math.pi, turn - 2.0 * math.pi, turn)
-        turn = np.where(turn < -math.pi, turn + 2.0 * math.pi, turn)
-        beyond = points - end
-        further = beyond @ second
-        # the end is where the second straight begins, whatever the angle says of a point
-        before = turn < -0.5 * angle
-        after = turn > 0.5 * angle
-        square = np.where(before, (y - radius) ** 2, (out - radius) ** 2) + z**2
-        square = np.where(after, np.maximum(np.einsum("ij,ij->i", beyond, beyond) - further**2, 0.0), square)
-        along = np.where(before, x, radius * (turn + 0.5 * angle))
-        along = np.where(after, radius * angle + further, along)
-        return along, np.sqrt(square)
+        frame = np.stack([start + radius * inward, first, -inward, normal, end, second])
+        return arc_coordinates(points, frame, radius, angle)

@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
-from cylx.geometry.lines import common_perpendicular
-from cylx.runs.bend import LEAST_TURN, Bend
-from cylx.runs.bend_fit import Solved, refined
-from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings
+from cylx.runs.bend import Bend
+from cylx.runs.bend_evidence import LEAST_INLIERS, WIDEST_BEND, FittedBend, judged
+from cylx.runs.bend_fit import refined
+from cylx.runs.meetings import Meeting
+from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings
 
-REACH = 30.0
-"""Ends further apart than this many radii are not joined by a bend."""
-WIDEST_BEND = 14.0
-"""Bends of a greater radius, in radii of the pipe, are bent pipes rather than elbows."""
-SAME_RADIUS = 0.12
-"""Radii of one pipe differ by less, beside their uncertainty."""
-SKEW = 0.25
-"""Axes meet if they pass each other within so many radii, beside their uncertainty."""
-OVERSHOOT = 1.5
-"""Straights may have been found so many radii too long: into the bend."""
-LOW_TURN = 0.4
-"""And over this, in radii, times the tangent of half the angle: a pipe hardly leaves a bend of a small angle."""
 MOST_POINTS = 900
 TRIED = 28
 """Bend radii that are tried before the fit."""
@@ -33,132 +22,12 @@ LOOSE = 0.02
 """Standard deviation of a tilt from which the axis of a pipe is hardly known, radians."""
 SAY = 0.8
 """Share of a pipe whose points say together with those of a bend how its axis lies, if that is hardly known."""
+SHORTEST = 1.5
+"""Points of so many radii of the centre line, at least, tell a bend between known pipes: also those of the pipes."""
 NEARBY = 3.0
 """Bends that begin within so many radii of the ends of their pipes come first."""
 SHARPEST = math.radians(100.0)
 """Mitres of a greater angle are none."""
-BINS = 8
-"""Pieces of the arc, at most, that are asked for points."""
-LEAST_INLIERS = 10
-LEAST_LENGTHWISE, LEAST_GOOD = 0.5, 0.8
-"""Share of the pieces of the arc that must hold more points on it than beside it: of all, of those with points."""
-ROUGH = 1.45
-"""Points that scatter so many times more than those of the pipes are of no bend."""
-MOST_INSIDE = 0.5
-"""Points inside the tube, or just beside its surface, for each point on it."""
-BESIDE = 0.3
-"""Points within so many radii of the surface are just beside it."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Meeting:
-    """Two ends whose axes meet.
-
-    Parameters
-    ----------
-    pipes : tuple of int
-    ends : tuple of {'start', 'end'}
-    bend : Bend
-        From the first pipe into the second, with no radius yet.
-    ahead : tuple of float
-        How far ahead of each end the axes meet; negative behind it.
-    """
-
-    pipes: tuple[int, int]
-    ends: tuple[End, End]
-    bend: Bend
-    ahead: tuple[float, float]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FittedBend:
-    """A bend that was fitted to points.
-
-    Parameters
-    ----------
-    pipes, ends
-        As of the meeting.
-    bend : Bend
-    radius : float
-        Of the tube.
-    indices : ndarray of shape (n,)
-        Points on the arc.
-    rms : float
-    lengthwise : float
-        Share of the arc, in pieces, that has points.
-    coverage : float
-        Share of its surface that has points.
-    inside : float
-        Points inside the tube for each point on it.
-    std : dict of str to float
-    shifts : ndarray of shape (2, 4)
-        By how much the axes of the pipes move: offsets and tilts.
-    covariances : ndarray of shape (2, 4, 4)
-        Of the two axes after the fit.
-    """
-
-    pipes: tuple[int, int]
-    ends: tuple[End, End]
-    bend: Bend
-    radius: float
-    indices: IndexArray
-    rms: float
-    lengthwise: float
-    coverage: float
-    inside: float
-    std: dict[str, float]
-    shifts: FloatArray
-    covariances: FloatArray
-
-
-def meetings(pipes: list[Pipe], taken: set[tuple[int, End]], only: frozenset[int] | None = None) -> Iterator[Meeting]:
-    """Yield the pairs of free ends whose axes meet ahead of them, at an angle.
-
-    Parameters
-    ----------
-    pipes : list of Pipe
-    taken : set of (int, {'start', 'end'})
-        Ends that have a fitting already.
-    only : frozenset of int, optional
-        Pipes of which each pair has one at least; by default any.
-    """
-    keys = [(i, end) for i in range(len(pipes)) for end in ENDS if (i, end) not in taken]
-    if len(keys) < 2:
-        return
-    places = np.array([pipes[i].at(end) for i, end in keys])
-    radii = np.array([pipes[i].radius for i, _ in keys])
-    sd = np.array([math.sqrt(max(pipes[i].covariance[4, 4], 0.0)) for i, _ in keys])
-    owners = np.array([i for i, _ in keys])
-    for a, (i, end) in enumerate(keys):
-        smaller = np.minimum(radii, radii[a])
-        near = np.linalg.norm(places - places[a], axis=1) < REACH * smaller
-        alike = np.abs(radii - radii[a]) < SAME_RADIUS * smaller + ON_SURFACE * np.hypot(sd, sd[a])
-        wanted = owners > i
-        if only is not None and i not in only:
-            wanted &= np.isin(owners, list(only))
-        for b in np.flatnonzero(near & alike & wanted):
-            other = keys[int(b)]
-            found = _meeting(pipes[i], end, pipes[other[0]], other[1])
-            if found is not None:
-                yield Meeting((i, other[0]), (end, other[1]), *found)
-
-
-def _meeting(one: Pipe, end: End, two: Pipe, other: End) -> tuple[Bend, tuple[float, float]] | None:
-    """Return the bend, without a radius, of two ends whose axes meet ahead of them."""
-    first, second = one.outward(end), -two.outward(other)
-    turn = math.atan2(float(np.linalg.norm(np.cross(first, second))), float(first @ second))
-    if not LEAST_TURN < turn < math.pi - LEAST_TURN:
-        return None
-    feet = common_perpendicular(one.at(end), first, two.at(other), second)[:2]
-    radius = min(one.radius, two.radius)
-    uncertain = math.hypot(one.axis_deviation(feet[0]), two.axis_deviation(feet[1]))
-    if float(np.linalg.norm(feet[0] - feet[1])) > SKEW * radius + ON_SURFACE * uncertain:
-        return None
-    ahead = float((feet[0] - one.at(end)) @ first), float((two.at(other) - feet[1]) @ second)
-    over = (OVERSHOOT + LOW_TURN / math.tan(0.5 * turn)) * radius
-    if min(ahead) < -over or max(ahead) > REACH * radius:
-        return None
-    return Bend(0.5 * (feet[0] + feet[1]), first, second, 0.0), ahead
 
 
 def fit_meeting(meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings) -> FittedBend | None:
@@ -200,7 +69,7 @@ def fit_meeting(meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings) -> 
     about = points[np.abs(distances - radius) < max(0.3 * radius, 2.0 * ON_SURFACE * spread)]
     says = SAY * one.length if is_loose(one) else 0.0, SAY * two.length if is_loose(two) else 0.0
     solved = refined(bend, one, two, radius, about, spread, says=says)
-    found = judged(meeting.pipes, meeting.ends, solved, indices, near, spread)
+    found = judged(meeting.pipes, meeting.ends, solved, indices, near, spread, SHORTEST)
     return None if found is None or _is_across(found, one, two, near) else found
 
 
@@ -275,70 +144,3 @@ def _costs(bend: Bend, radii: FloatArray, points: FloatArray, radius: float, spr
         squares[k] = np.minimum(((distances - radius) / width) ** 2, 1.0)
     # a larger bend is shorter, so that costs count all points that are on any of them
     return np.asarray(squares[:, (squares < 1.0).any(axis=0)].sum(axis=1))
-
-
-def judged(
-    pipes: tuple[int, int],
-    ends: tuple[End, End],
-    solved: Solved,
-    indices: IndexArray,
-    near: Surroundings,
-    spread: float,
-) -> FittedBend | None:
-    """Return a fitted bend with its evidence; None if the points do not show it."""
-    bend, radius = solved.bend, solved.radius
-    if bend.bend_radius > 1.1 * WIDEST_BEND * radius:
-        return None
-    along, distances = bend.coordinates(near.points[indices])
-    errors = distances - radius
-    width = ON_SURFACE * spread + 0.01 * radius
-    # of a mitre, the points about the corner
-    margin = max(0.0, 0.5 * radius * math.tan(0.5 * bend.angle) - 0.5 * bend.length)
-    on_arc = (along > -margin) & (along < bend.length + margin)
-    inside = on_arc & (errors < -width - 0.1 * radius)
-    own = on_arc & (np.abs(errors) < width)
-    count = int(own.sum())
-    beside = on_arc & (np.abs(errors) >= width) & (np.abs(errors) < max(BESIDE * radius, 2.0 * width))
-    if count < LEAST_INLIERS or inside.sum() > MOST_INSIDE * count or beside.sum() > MOST_INSIDE * count:
-        return None
-    pieces = int(np.clip((bend.length + 2.0 * margin) / max(2.0 * near.spacing, 1e-12), 1, BINS))
-    rows = np.clip(((along + margin) / (bend.length + 2.0 * margin) * pieces).astype(np.int64), 0, pieces - 1)
-    on_it, off_it = (np.bincount(rows[which], minlength=pieces) for which in (own, inside | beside))
-    # a bend that is two shows in pieces whose points are beside it
-    good, filled = on_it > off_it, on_it + off_it > 0
-    lengthwise = float(good.mean())
-    one_bend = good.sum() >= LEAST_GOOD * filled.sum()
-    rms = float(np.sqrt((errors[own] ** 2).mean()))
-    if not one_bend or lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
-        return None
-    coverage = _covered(bend, near.points[indices[own]], rows[own]) / (12.0 * pieces)
-    turn = solved.covariance[2:4, 2:4] + solved.covariance[6:8, 6:8]
-    std = {
-        "bend_radius": math.sqrt(max(solved.covariance[9, 9], 0.0)),
-        "angle_deg": math.degrees(math.sqrt(max(0.5 * np.trace(turn), 0.0))),
-        "radius": math.sqrt(max(solved.covariance[8, 8], 0.0)),
-    }
-    return FittedBend(
-        pipes,
-        ends,
-        bend,
-        radius,
-        indices[own],
-        rms,
-        lengthwise,
-        coverage,
-        float(inside.sum()) / count,
-        std,
-        solved.change.reshape(2, 4),
-        np.stack([solved.covariance[:4, :4], solved.covariance[4:8, 4:8]]),
-    )
-
-
-def _covered(bend: Bend, points: FloatArray, rows: IndexArray) -> int:
-    """Return how many cells of the surface of a bend hold points: each of its pieces has twelve about the tube."""
-    radial = points - (bend.meeting if bend.bend_radius == 0 else bend.center)
-    # angle about the tube: from the outside of the bend
-    high = radial @ bend.normal
-    out = np.hypot(radial @ bend.first, radial @ bend.inward) - bend.bend_radius
-    sector = np.floor((np.arctan2(high, out) / (2 * math.pi) + 0.5) * 12).astype(np.int64) % 12
-    return len(np.unique(rows * 12 + sector))

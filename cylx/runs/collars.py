@@ -312,7 +312,9 @@ def _inline(first: Collar, second: Collar, ring: _Ring, pipe: Pipe, near: Surrou
     start, end = _height(first, pipe) - 0.5 * first.thickness, _height(second, pipe) + 0.5 * second.thickness
     center = pipe.start + 0.5 * (start + end) * pipe.direction
     coverage = sides / SECTORS
-    return Collar("inline", "side", center, radius, end - start, True, body.indices, 0.0, coverage, 0.8, {})
+    wrong = min(1.0, seen / max(usual, 1e-300))
+    sure = 0.99 * (1.0 - math.exp(-len(body.indices) / 15.0)) * (0.5 + 0.5 * min(1.0, 2.0 * coverage)) * (1.0 - wrong)
+    return Collar("inline", "side", center, radius, end - start, True, body.indices, 0.0, coverage, sure, {})
 
 
 def _is_of_cover(collar: Collar, pipe: Pipe, covers: list[Pipe]) -> bool:

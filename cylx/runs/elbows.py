@@ -9,10 +9,12 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import canonical_direction
 from cylx.records import Elbow
+from cylx.runs.bend_evidence import FittedBend
 from cylx.runs.bend_fit import bend_of
-from cylx.runs.bending import NEARBY, FittedBend, Meeting, fit_meeting, gap_before, is_loose, meetings
-from cylx.runs.pieces import OTHER_RADIUS, refit
+from cylx.runs.bending import NEARBY, fit_meeting, gap_before, is_loose
+from cylx.runs.meetings import Meeting, meetings
 from cylx.runs.pipes import End, Pipe, Surroundings, axis_change, tilted
+from cylx.runs.refitting import OTHER_RADIUS, refit
 from cylx.runs.tracing import BY_AXES, Trace, trust
 
 SHORT, LOOSE_OFFSET, LOOSE_TILT = 4.0, 0.1, 0.05
@@ -118,7 +120,7 @@ def _add_bend(trace: Trace, one: FittedBend) -> None:
     fitting = Elbow(
         joins=one.pipes,
         ends=one.ends,
-        confidence=trust(len(one.indices), one.lengthwise, one.inside) if len(one.indices) else BY_AXES,
+        confidence=max(BY_AXES, trust(len(one.indices), one.lengthwise, one.inside)),
         inliers=len(one.indices),
         rms=one.rms,
         coverage=one.coverage,

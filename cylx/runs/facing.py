@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import LEAST_TURN
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, sectors_of
 
@@ -172,17 +173,17 @@ class _Cone:
         """Return the signed distances of points from pipe, cone and pipe."""
         start, end = self.ends(low, high)
         share = np.clip((heights - low) / (high - low), 0.0, 1.0)
-        onward = -self.two.outward(self.facing.ends[1])
-        center = start + share[:, None] * (end - start)
-        center = center + np.minimum(heights - low, 0.0)[:, None] * self.axis
-        center = center + np.maximum(heights - high, 0.0)[:, None] * onward
-        away = points - center
-        away = away - (away @ self.axis)[:, None] * self.axis
+        # across the axis, where the centre line only shifts
+        across = np.stack(axis_basis(self.axis))
+        onward = across @ -self.two.outward(self.facing.ends[1])
+        x, y = across @ (points - start).T
+        shift, beyond = across @ (end - start), np.maximum(heights - high, 0.0)
+        away = np.hypot(x - share * shift[0] - beyond * onward[0], y - share * shift[1] - beyond * onward[1])
         radii = self.one.radius + share * (self.two.radius - self.one.radius)
         slope = (self.two.radius - self.one.radius) / (high - low)
         between = (heights > low) & (heights < high)
         slant = np.where(between, 1.0 / math.sqrt(1.0 + slope**2), 1.0)
-        return np.asarray((np.linalg.norm(away, axis=1) - radii) * slant)
+        return np.asarray((away - radii) * slant)
 
 
 def _search(

@@ -11,8 +11,8 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
-from cylx.runs.pieces import is_borne_out, refit
 from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings, turned
+from cylx.runs.refitting import is_borne_out, refit
 
 RATIOS = (0.45, 0.55, 0.65, 0.73, 0.8, 0.87, 1.15, 1.25, 1.37, 1.53, 1.8, 2.2)
 """Radii of the pipe behind the reducer that are tried, in those of the pipe before it."""
@@ -45,8 +45,10 @@ class _Tried(NamedTuple):
     shift: tuple[float, float]
 
 
-def narrowed(pipe: Pipe, end: End, near: Surroundings) -> Pipe | None:
+def narrowed(pipe: Pipe, end: End, near: Surroundings) -> tuple[Pipe, float] | None:
     """Find the pipe of another radius that goes on from an end of a pipe behind a reducer; None if there is none.
+
+    Also return by how much the points ahead of the end speak for both of them, as log-likelihood ratio.
 
     Parameters
     ----------
@@ -68,7 +70,7 @@ def narrowed(pipe: Pipe, end: End, near: Surroundings) -> Pipe | None:
     found = _best(x[some], a[some], b[some], pipe, back, len(x) / max(len(x[some]), 1))
     if found is None:
         return None
-    low, high, other, shift = found
+    low, high, other, shift, score = found
     start = place + low * axis + shift[0] * first + shift[1] * second
     stop = place + high * axis + shift[0] * first + shift[1] * second
     label = near.new_label()
@@ -80,13 +82,13 @@ def narrowed(pipe: Pipe, end: End, near: Surroundings) -> Pipe | None:
     short = len(on) < LEAST_BEHIND or fitted.length < LEAST_LENGTH * fitted.radius
     if short or not is_borne_out(fitted, near.points[indices], LEAST_BEHIND):
         return None
-    return replace(fitted, spread=pipe.spread)
+    return replace(fitted, spread=pipe.spread), score
 
 
 def _best(
     x: FloatArray, a: FloatArray, b: FloatArray, pipe: Pipe, back: float, weight: float
-) -> tuple[float, float, float, tuple[float, float]] | None:
-    """Return where the pipe behind the best reducer begins and ends, its radius, and how far aside it is."""
+) -> tuple[float, float, float, tuple[float, float], float] | None:
+    """Return where the pipe behind the best reducer begins and ends, its radius, how far aside it is, and a score."""
     radius, spread = pipe.radius, pipe.spread
     shell = max(SHELL * radius, 2.0 * ON_SURFACE * spread)
     ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * spread))
@@ -130,4 +132,5 @@ def _best(
     best = max([first, *tried(RATIOS[max(place - 1, 0) : place + 2], LENGTHS, BEFORE, SIDES)])
     if (best.score - alone) * weight < LEAST_SCORE:
         return None
-    return best.begin, best.end, best.radius, best.shift
+    behind = plain[min(max(int(-back / step) - 1, 0), len(plain) - 1)] if back < 0 else 0.0
+    return best.begin, best.end, best.radius, best.shift, (best.score - float(behind)) * weight

@@ -10,8 +10,8 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import Bend
+from cylx.runs.bend_evidence import FittedBend, judged
 from cylx.runs.bend_fit import Solved, refined
-from cylx.runs.bending import FittedBend, judged
 from cylx.runs.elbows import add_bends, add_fitted
 from cylx.runs.narrowing import narrowed
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
@@ -37,8 +37,12 @@ LEAST_AHEAD = 12
 LEAST_SCORE = 25.0
 """Log-likelihood ratio of a bend and a pipe against nothing of the kind."""
 LEAST_TURN = math.radians(10.0)
-LEAST_STRAIGHT = 0.5
-"""A pipe behind a bend is as long at least, in radii."""
+SLIGHT = math.radians(30.0)
+"""Bends of a smaller angle may be reducers."""
+SHARPEST_BEND = 0.5
+"""Bend radius, in radii of the pipe: a mitre is taken for one only between pipes that are known."""
+LEAST_STRAIGHT, LEAST_AFTER_SLIGHT = 0.5, 1.5
+"""A pipe behind a bend is as long at least, in radii: behind any, and behind a slight one."""
 LEAST_ON_STRAIGHT = 8
 LOOSE_OFFSET, LOOSE_TILT = 0.2, 0.1
 """What is known of a pipe before it is fitted: standard deviations, in radii and radians."""
@@ -62,14 +66,15 @@ def follow_ends(trace: Trace, near: Surroundings) -> int:
                 continue
             trace.followed.add((index, end))
             found = onward_bend(trace.pipes[index], index, end, len(trace.pipes), near)
-            if found is None:
+            other = None
+            if found is None or found[1].bend.angle < SLIGHT:
                 other = narrowed(trace.pipes[index], end, near)
-                if other is not None:
-                    trace.pipes.append(other)
-                    near.label(near.on(other), other.label)
-                    count += 1
-            else:
-                pipe, bend = found
+            if other is not None and (found is None or other[1] > found[2]):
+                trace.pipes.append(other[0])
+                near.label(near.on(other[0]), other[0].label)
+                count += 1
+            elif found is not None:
+                pipe, bend, _ = found
                 trace.pipes.append(pipe)
                 add_fitted(trace, [bend])
                 near.label(near.on(trace.pipes[-1]), pipe.label)
@@ -79,8 +84,12 @@ def follow_ends(trace: Trace, near: Surroundings) -> int:
     return count
 
 
-def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surroundings) -> tuple[Pipe, FittedBend] | None:
+def onward_bend(
+    pipe: Pipe, index: int, end: End, number: int, near: Surroundings
+) -> tuple[Pipe, FittedBend, float] | None:
     """Find the bend at an end of a pipe, and the pipe that goes on from there; None if there is none.
+
+    Also return by how much the points ahead of the end speak for both of them, as log-likelihood ratio.
 
     Parameters
     ----------
@@ -111,7 +120,7 @@ def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surrounding
             best = one
     if best is None or best[0] < LEAST_SCORE:
         return None
-    _, solved, loose, length = best
+    score, solved, loose, length = best
     bend = solved.bend
     first, last = turned(bend.end, bend.end + length * bend.second)
     joined: End = "start" if float((last - first) @ bend.second) > 0 else "end"
@@ -129,7 +138,7 @@ def onward_bend(pipe: Pipe, index: int, end: End, number: int, near: Surrounding
     # the new pipe is where the fit has it already
     shifts = fitted.shifts.copy()
     shifts[1] = 0.0
-    return found, replace(fitted, shifts=shifts)
+    return found, replace(fitted, shifts=shifts), score
 
 
 def _refined(
@@ -145,10 +154,10 @@ def _refined(
     some = about[:: max(1, len(about) // MOST_IN_FIT)]
     solved = refined(bend, pipe, loose, radius, some, spread, 12, (0.0, length))
     bend = solved.bend
-    if bend.angle < LEAST_TURN or bend.bend_radius > 1.2 * RADII[-1] * radius:
+    if bend.angle < LEAST_TURN or not SHARPEST_BEND * radius < bend.bend_radius < 1.2 * RADII[-1] * radius:
         return None
     length = _length_beyond(bend, radius, spread, points)
-    if length < LEAST_STRAIGHT * radius:
+    if length < (LEAST_STRAIGHT if bend.angle > SLIGHT else LEAST_AFTER_SLIGHT) * radius:
         return None
     return _score(bend, radius, spread, points, length), solved, loose, length
 

@@ -8,14 +8,16 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Elbow, Flange, Inline, Junction
-from cylx.runs.pipes import Pipe
+from cylx.runs.pipes import ENDS, Pipe
 from cylx.runs.tracing import Trace
 from cylx.runs.wider import LONGEST_RIM
 
+MID_CONE = 1.5
+"""A pipe between a wider and a narrower one is longer, in its radii; what is shorter is a piece of a reducer."""
 WITHIN = 0.5
 """A piece of an elbow that was found as a cylinder has its axis within so many radii of the centre line."""
-LEAST_LEFT, LEAST_POINTS = 0.7, 8
-"""A pipe that was found along a run has a length of so many radii, and so many points, in the end."""
+LEAST_LEFT, LEAST_ALONE, LEAST_POINTS = 0.7, 6.0, 8
+"""A pipe that was found along a run has a length of so many radii, if nothing joins it any more, and so many points."""
 
 
 def drop_parts(trace: Trace) -> Trace:
@@ -38,7 +40,7 @@ def drop_parts(trace: Trace) -> Trace:
     for fitting in trace.fittings:
         if isinstance(fitting, Elbow) and fitting.bend_radius > 0:
             parts |= {k for k, pipe in enumerate(trace.pipes) if k not in joined and _is_within(pipe, fitting)}
-    parts |= {k for k, pipe in enumerate(trace.pipes) if _is_remnant(pipe, trace)}
+    parts |= {k for k in range(len(trace.pipes)) if _is_remnant(k, trace, k not in joined)}
     kept = [k for k in range(len(trace.pipes)) if k not in parts]
     number = {old: new for new, old in enumerate(kept)}
     near = trace.near
@@ -70,11 +72,23 @@ def _is_within(pipe: Pipe, elbow: Elbow) -> bool:
     return bool(on.all() and (turn > -slack).all() and (turn < elbow.angle + slack).all())
 
 
-def _is_remnant(pipe: Pipe, trace: Trace) -> bool:
-    """Return whether of a pipe that was found along a run hardly anything is left between its fittings."""
-    if pipe.source is not None:
+def _is_remnant(index: int, trace: Trace, alone: bool) -> bool:
+    """Return whether hardly anything is left of a pipe that was found along a run; `alone` if nothing joins it.
+
+    Or whether it is a piece of one cone that was taken for a pipe between two.
+    """
+    pipe = trace.pipes[index]
+    fittings = [trace.fittings[trace.taken[index, end]] for end in ENDS if (index, end) in trace.taken]
+    at = sorted(one.kind for one in fittings)
+    if at == ["reducer", "reducer"] and pipe.length < MID_CONE * pipe.radius:
+        radii = sorted(trace.pipes[k].radius for one in fittings for k in one.joins if k != index)
+        if radii[0] < pipe.radius < radii[-1]:
+            return True
+    # hardly more than a weld between a bend and a bend or a reducer is a pipe that joins them
+    if pipe.source is not None or at in (["elbow", "elbow"], ["elbow", "reducer"]):
         return False
-    return pipe.length < LEAST_LEFT * pipe.radius or len(trace.near.on(pipe)) < LEAST_POINTS
+    least = LEAST_ALONE if alone else LEAST_LEFT
+    return pipe.length < least * pipe.radius or len(trace.near.on(pipe)) < LEAST_POINTS
 
 
 _OF_ONE = ("cap", "flange", "inline")

@@ -8,35 +8,27 @@ from dataclasses import replace
 
 import numpy as np
 
-from cylx.fits.likelihood import Prior, fit_mixture
-from cylx.fits.robust import TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray, MaskArray
-from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, canonical_direction
+from cylx.runs.changes import changed
 from cylx.runs.facing import facing_ends
-from cylx.runs.pipes import LEAST_SPREAD, ON_SURFACE, End, Pipe, Surroundings, turned
+from cylx.runs.pipes import LEAST_SPREAD, End, Pipe, Surroundings, turned
+from cylx.runs.refitting import LEAST_POINTS, differs, is_borne_out, refit
 from cylx.runs.roughness import is_rough
+from cylx.runs.stretches import SHELL, hole_in, stretch
 
-SHELL = 0.3
-"""Points within so many radii of the surface, but not on it, say that the pipe is not there."""
 CUT = 0.5
 """A pipe is fitted again if it lost so many radii of its length."""
-LEAST_POINTS, LEAST_LENGTH = 30, 1.5
-"""Of a piece: points, and length in its radii."""
-OWN_SHARE = 0.6
-"""Share of the points about a piece that must be on it."""
-SHORT, KNOWN_TILT = 5.0, 0.02
-"""The axis of a piece shorter than so many radii is known from before, with this deviation in radians."""
+MOST_SMOOTH = 0.7
+"""Share of the length of the pieces of a pipe that is smooth, or it is none: stems of trees are rough all along."""
+LEAST_LENGTH = 1.5
+"""Of a piece, in its radii."""
 UNSURE = 0.01
 """A radius less certain than this, in itself, may be that of two pipes taken for one."""
-HOLE = 12.0
-"""Log-likelihood ratio against a pipe, within it, from which it may be two pipes."""
 ONE_RADIUS, MOST_PIECES = 0.15, 2
 """What is more pieces of about one radius winds: it is no pipe."""
 PARTS = 4
 DEPTH = 4
 """Times that the rest of a pipe is looked at for more pieces."""
-OTHER_RADIUS, OTHER_AXIS = 0.03, 0.06
-"""Pieces that differ by less, in radii, beside their uncertainty, are one pipe."""
 LONGEST_HIDDEN = 20.0
 """Pieces of one pipe are joined across gaps up to so many radii."""
 PARALLEL = math.cos(math.radians(5.0))
@@ -58,8 +50,10 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
         pipe = one
         rough = not is_unsure(pipe) and is_rough(pipe, near)
         pieces = [] if rough else _pieces(pipe, near, [other for other in pipes if other is not pipe], DEPTH)
-        if any(is_rough(piece, near) for piece in pieces):
-            pieces = []
+        smooth = [piece for piece in pieces if not is_rough(piece, near)]
+        # a bend or a valve at a pipe is rough, but most of it is smooth
+        enough = sum(piece.length for piece in smooth) > MOST_SMOOTH * sum(piece.length for piece in pieces)
+        pieces = smooth if enough else []
         if sum(abs(piece.radius - pipe.radius) < ONE_RADIUS * pipe.radius for piece in pieces) > MOST_PIECES:
             pieces, pipe = [], replace(pipe, is_other=True)
         first = max(pieces, key=lambda one: one.length) if pieces else pipe
@@ -115,6 +109,10 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
     indices, foreign = indices[used], of_others[used]
     points, own = near.points[indices], near.points[indices[~foreign]]
     best = _sure(pipe, points, own, foreign, near.noise)
+    two = changed(best, own) if depth > 0 and is_unsure(pipe) else None
+    if two is not None:
+        new = [side for side in two if not any(_is_twin(side, other) for other in others)]
+        return [piece for side in new for piece in _pieces(side, near, others, depth - 1)]
     for _ in range(3):
         low, high, _ = stretch(best, points, foreign)
         if high - low < LEAST_LENGTH * pipe.radius:
@@ -132,6 +130,15 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
         between = _other(pipe.with_ends(first.end, second.start), near)
         return sides if between is None else [*sides, *_pieces(between, near, others, depth - 1)]
     return [best, *_rest(pipe, best, near, others, depth)]
+
+
+def _is_twin(pipe: Pipe, other: Pipe) -> bool:
+    """Return whether most of a pipe is on another one of the same axis and radius."""
+    if abs(float(pipe.direction @ other.direction)) < PARALLEL or differs(pipe, other):
+        return False
+    ends = sorted(float((place - other.middle) @ other.direction) for place in (pipe.start, pipe.end))
+    within = min(ends[1], 0.5 * other.length) - max(ends[0], -0.5 * other.length)
+    return within > 0.5 * pipe.length
 
 
 def is_unsure(pipe: Pipe) -> bool:
@@ -159,39 +166,9 @@ def _sure(pipe: Pipe, points: FloatArray, own: FloatArray, foreign: MaskArray, n
     return best
 
 
-def gains(pipe: Pipe, points: FloatArray, foreign: MaskArray | None = None) -> tuple[FloatArray, FloatArray]:
-    """Return heights of points from the middle of a pipe, and the log-likelihood ratio of each for it.
-
-    That is of a point on the surface against one anywhere in the shell about it; 0 for points further away.
-    """
-    away = points - pipe.middle
-    heights = away @ pipe.direction
-    square = np.einsum("ij,ij->i", away, away) - heights**2
-    errors = np.abs(np.sqrt(np.maximum(square, 0.0)) - pipe.radius)
-    shell = max(SHELL * pipe.radius, 2.0 * ON_SURFACE * pipe.spread)
-    ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * pipe.spread))
-    scores = np.where(errors < shell, np.maximum(ratio - 0.5 * (errors / pipe.spread) ** 2, -ratio), 0.0)
-    if foreign is not None:
-        scores[foreign] = np.minimum(scores[foreign], 0.0)
-    return heights, scores
-
-
-def _hole(pipe: Pipe, points: FloatArray, foreign: MaskArray) -> tuple[float, float] | None:
-    """Return between which heights the points speak most against a pipe, if they do so clearly; None if not."""
-    heights, scores = gains(pipe, points, foreign)
-    order = np.argsort(heights, kind="stable")
-    heights, total = heights[order], np.concatenate([[0.0], np.cumsum(scores[order])])
-    highest = np.maximum.accumulate(total)
-    last = int(np.argmin(total - highest))
-    first = int(np.argmax(total[: last + 1]))
-    if last <= first or total[last] - total[first] > -HOLE:
-        return None
-    return float(heights[first]), float(heights[last - 1])
-
-
 def _parted(pipe: Pipe, points: FloatArray, own: FloatArray, foreign: MaskArray) -> tuple[Pipe, Pipe] | None:
     """Return the two pipes that a pipe is, if they are different on both sides of a hole in it; None if not."""
-    hole = _hole(pipe, points, foreign)
+    hole = hole_in(pipe, points, foreign)
     if hole is None:
         return None
     low, high = (pipe.middle + height * pipe.direction for height in hole)
@@ -204,82 +181,6 @@ def _parted(pipe: Pipe, points: FloatArray, own: FloatArray, foreign: MaskArray)
             return None
         sides.append(fitted)
     return (sides[0], sides[1]) if differs(sides[0], sides[1]) else None
-
-
-def stretch(pipe: Pipe, points: FloatArray, foreign: MaskArray | None = None) -> tuple[float, float, float]:
-    """Return between which heights from its middle a pipe is borne out by the points about it, and by how much.
-
-    Points on its surface speak for it, those near it against it; the stretch has the largest sum.
-
-    Parameters
-    ----------
-    pipe : Pipe
-    points : ndarray of shape (N, 3)
-    foreign : ndarray of shape (N,), bool, optional
-        Points of other pipes: they speak against it, but where they are on its surface as well.
-    """
-    half = 0.5 * pipe.length
-    heights, scores = gains(pipe, points, foreign)
-    inside = np.abs(heights) <= half
-    counted = np.flatnonzero(inside & (scores != 0.0))
-    if not len(counted):
-        return 0.0, 0.0, 0.0
-    order = counted[np.argsort(heights[counted], kind="stable")]
-    total = np.concatenate([[0.0], np.cumsum(scores[order])])
-    lowest = np.minimum.accumulate(total)
-    last = int(np.argmax(total - lowest))
-    first = int(np.argmin(total[: last + 1]))
-    if last <= first:
-        return 0.0, 0.0, 0.0
-    low, high = float(heights[order[first]]), float(heights[order[last - 1]])
-    # ends that lose nothing stay where they were
-    slack = 0.3 * pipe.radius
-    gain = float(total[last] - total[first])
-    return (-half if low + half < slack else low), (half if half - high < slack else high), gain
-
-
-def refit(pipe: Pipe, points: FloatArray, width: float | None = None) -> Pipe | None:
-    """Fit a pipe to the points between its ends; None if that fails.
-
-    Parameters
-    ----------
-    pipe : Pipe
-    points : ndarray of shape (N, 3)
-    width : float, optional
-        How near to its surface points have a say at first.
-    """
-    half = 0.5 * pipe.length
-    width = width or max(4.0 * pipe.spread, 0.03 * pipe.radius)
-    floor = ON_SURFACE * pipe.spread
-    schedule = WeightSchedule(width, min(floor, width), 1.0, TUKEY * TUKEY_SPREAD, 1e-6)
-    fit = fit_cylinder(np.ascontiguousarray(points), pipe.model(), low=-half, high=half, schedule=schedule, steps=30)
-    if fit is None:
-        return None
-    model = fit[0]
-    deviation = max(fit[1] * TUKEY_SPREAD, 1e-9 * float(model[RADIUS]))
-    model[DIRECTION] = canonical_direction(model[DIRECTION])
-    prior = None
-    if pipe.length < SHORT * pipe.radius:  # points at the ends that are of something else would turn its axis
-        model[DIRECTION] = pipe.direction
-        prior = Prior(direction=pipe.direction, direction_deviation=KNOWN_TILT)
-    likely = fit_mixture(points, model, low=-half, high=half, width=8.0 * deviation, deviation=deviation, prior=prior)
-    if likely is None:
-        return None
-    model = likely.model
-    middle, direction, radius = model[POINT], model[DIRECTION], float(model[RADIUS])
-    spread = max(deviation, LEAST_SPREAD * radius)
-    covariance = np.asarray(likely.covariance, dtype=np.float64)
-    if not (np.isfinite(covariance).all() and np.isfinite(model).all() and radius > 0):
-        return None
-    found = replace(
-        pipe,
-        start=middle - half * direction,
-        end=middle + half * direction,
-        radius=radius,
-        spread=min(spread, 2.0 * pipe.spread),
-        covariance=covariance,
-    )
-    return found.with_ends(*turned(pipe.start, pipe.end))
 
 
 def _rest(pipe: Pipe, best: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) -> list[Pipe]:
@@ -310,25 +211,3 @@ def _other(rest: Pipe, near: Surroundings) -> Pipe | None:
     if found is None or abs(float(found.direction @ rest.direction)) < PARALLEL:
         return None
     return found if is_borne_out(found, near.points[indices]) else None
-
-
-def is_borne_out(pipe: Pipe, points: FloatArray, least: int = LEAST_POINTS) -> bool:
-    """Return whether most of the points about a pipe are on it."""
-    away = points - pipe.middle
-    heights = away @ pipe.direction
-    errors = np.abs(np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - heights**2, 0.0)) - pipe.radius)
-    about = (np.abs(heights) <= 0.5 * pipe.length) & (errors < SHELL * pipe.radius)
-    own = about & (errors < ON_SURFACE * pipe.spread)
-    return bool(own.sum() >= max(least, OWN_SHARE * about.sum()))
-
-
-def differs(one: Pipe, two: Pipe) -> bool:
-    """Return whether two pieces of about one axis are different pipes."""
-    sd = math.sqrt(max(float(one.covariance[4, 4] + two.covariance[4, 4]), 0.0))
-    radius = min(one.radius, two.radius)
-    if abs(one.radius - two.radius) > OTHER_RADIUS * radius + ON_SURFACE * sd:
-        return True
-    place = 0.5 * (one.middle + two.middle)
-    feet = [pipe.middle + float((place - pipe.middle) @ pipe.direction) * pipe.direction for pipe in (one, two)]
-    uncertain = ON_SURFACE * math.hypot(one.axis_deviation(place), two.axis_deviation(place))
-    return float(np.linalg.norm(feet[0] - feet[1])) > OTHER_AXIS * radius + uncertain

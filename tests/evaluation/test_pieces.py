@@ -67,3 +67,14 @@ def test_pieces_that_are_no_list_are_named():
     assert str(caught.value) == (
         "truth.cylinders[0].pieces: is not a list; give a list of pairs of points, or leave it out"
     )
+
+
+@pytest.mark.parametrize(
+    ("middle", "counts"),
+    [(11.0, (1, 0, 1)), (4.0, (1, 1, 0)), (30.0, (1, 1, 0))],
+    ids=["on the ignored one", "on the other", "on none"],
+)
+def test_what_is_on_an_ignored_one_in_line_is_no_duplicate(middle, counts):
+    known = document(cylinder(height=20.0), cylinder(point=(0, 0, 11), height=2.0, radius=0.95, ignore=True))
+    outcome = evaluate(known, document(cylinder(height=20.0), cylinder(point=(0, 0, middle), height=1.0, radius=0.95)))
+    assert (outcome.matched, outcome.duplicates, outcome.ignored) == counts
