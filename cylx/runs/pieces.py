@@ -18,8 +18,6 @@ from cylx.runs.stretches import SHELL, hole_in, stretch
 
 CUT = 0.5
 """A pipe is fitted again if it lost so many radii of its length."""
-MOST_SMOOTH = 0.7
-"""Share of the length of the pieces of a pipe that is smooth, or it is none: stems of trees are rough all along."""
 LEAST_LENGTH = 1.5
 """Of a piece, in its radii."""
 UNSURE = 0.01
@@ -50,10 +48,8 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
         pipe = one
         rough = not is_unsure(pipe) and is_rough(pipe, near)
         pieces = [] if rough else _pieces(pipe, near, [other for other in pipes if other is not pipe], DEPTH)
-        smooth = [piece for piece in pieces if not is_rough(piece, near)]
-        # a bend or a valve at a pipe is rough, but most of it is smooth
-        enough = sum(piece.length for piece in smooth) > MOST_SMOOTH * sum(piece.length for piece in pieces)
-        pieces = smooth if enough else []
+        if any(is_rough(piece, near) for piece in pieces):
+            pieces = []
         if sum(abs(piece.radius - pipe.radius) < ONE_RADIUS * pipe.radius for piece in pieces) > MOST_PIECES:
             pieces, pipe = [], replace(pipe, is_other=True)
         first = max(pieces, key=lambda one: one.length) if pieces else pipe
