@@ -95,13 +95,8 @@ def finish(
     if likely is None:
         return refit(segment, indexed)
     prior = None if known is None else known.as_far_as_borne_out(likely)
-    if inflated == 1.0 and (prior is None or prior.direction is None):
-        upright = _upright(segment, indexed.planes, likely)
-        prior = (
-            upright
-            if prior is None or upright is None
-            else prior._replace(direction=upright.direction, direction_deviation=upright.direction_deviation)
-        )
+    if inflated == 1.0:
+        prior = _upright(segment, indexed.planes, likely, prior)
     robust = inflated > 1.0 and prior is None
     if robust:
         fitted = refit(segment, indexed)
@@ -134,19 +129,23 @@ def finish(
     return replace(free, model=moved, covariance=covariance, choice=choice)
 
 
-def _upright(segment: Segment, planes: FloatArray, fit: MixtureFit) -> Prior | None:
-    """Return the prior of a short cylinder that its axis is the normal of a plane; None if the points say otherwise.
+def _upright(segment: Segment, planes: FloatArray, fit: MixtureFit, known: Prior | None) -> Prior | None:
+    """Add to what is known of a short cylinder that its axis is the normal of a plane, unless the points say otherwise.
 
     The tilt of a disc, of a bore in a plate or of a pin is hardly seen in its few points, and what crosses its ends
     bends it. Nearly all of them stand on a plane or end at one.
     """
-    if segment.half > SHORT * segment.radius or segment.wedge is not None or len(planes) == 0:
-        return None
+    told = known is not None and known.direction is not None
+    if told or segment.half > SHORT * segment.radius or segment.wedge is not None or len(planes) == 0:
+        return known
     cosines = planes @ segment.direction
     best = int(np.abs(cosines).argmax())
     if abs(cosines[best]) < NEARLY_UPRIGHT:
-        return None
-    return Prior(direction=planes[best], direction_deviation=UPRIGHT_DEVIATION).as_far_as_borne_out(fit, LEANING)
+        return known
+    upright = Prior(direction=planes[best], direction_deviation=UPRIGHT_DEVIATION)
+    if upright.as_far_as_borne_out(fit, LEANING) is None:
+        return known
+    return (known or Prior())._replace(direction=planes[best], direction_deviation=UPRIGHT_DEVIATION)
 
 
 def _with_shared_error(covariance: FloatArray, points: FloatArray, fitted: Segment, inflated: float) -> FloatArray:
