@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from cylx.harmless import visible
-from cylx.io.e57_xml import coordinate_metadata
+from cylx.io.e57_xml import coordinate_metadata, scanner_places
 from cylx.optional.extras import is_found
 from cylx.records.sources import Crs
 from cylx.units import METRES, unit_of
@@ -70,9 +70,10 @@ def las_source(header: bytes, facts: LasFacts) -> dict[str, Any]:
 
 
 def e57_source(source: Input) -> dict[str, Any]:
-    """Return the keys of a `Source` for an E57 that was read: its lengths are in metres, as the standard has it."""
+    """Return the keys of a `Source` for an E57 that was read, which is in metres: unit, CRS, places of scanners."""
     found = crs_facts(coordinate_metadata(source))
-    return {"units": "m"} | ({"crs": found["crs"]} if "crs" in found else {})
+    facts: dict[str, Any] = {"units": "m", "stations": scanner_places(source)}
+    return facts | ({"crs": found["crs"]} if "crs" in found else {})
 
 
 def _records(header: bytes) -> Iterator[tuple[int, bytes]]:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 import struct
+from contextlib import suppress
+from math import isfinite
 from typing import TYPE_CHECKING
 from xml.parsers import expat
 
@@ -26,6 +28,7 @@ _APART = {b"<?": b"?>", b"<!--": b"-->", b"<![CDATA[": b"]]>"}
 _OPENING = re.compile(rb"<\?|<!--|<!\[CDATA\[")
 _DTD = re.compile(rb"<!\s*(?:DOCTYPE|ENTITY|ELEMENT|ATTLIST|NOTATION)", re.IGNORECASE)
 _SCHEMA = re.compile(rb"schemaLocation\s*=", re.IGNORECASE)
+_SCANS = ["e57Root", "data3D"]
 _DEEPEST = 100
 """Elements within one another: the standard has about ten."""
 _MOST_PARTS = 1 << 12
@@ -92,6 +95,52 @@ def coordinate_metadata(source: Input) -> str:
     except (expat.ExpatError, LookupError):
         return ""
     return "".join(found)[:LONGEST]
+
+
+def scanner_places(source: Input) -> tuple[tuple[float, float, float] | None, ...]:
+    """Return the places of the scanners of an E57 file: the translations of the poses of its scans.
+
+    Parameters
+    ----------
+    source : Input
+        A file that was read.
+
+    Returns
+    -------
+    tuple of (float, float, float) or None
+        One for each scan; None for one without a pose, or whose pose moves nothing: its points may be those of several.
+    """
+    poses: list[dict[str, float]] = []
+    path: list[str] = []
+    scaling = [1.0, 0.0]
+
+    def down(name: str, attributes: dict[str, str]) -> None:
+        path.append(name)
+        if path == [*_SCANS, "vectorChild"]:
+            poses.append({})
+        with suppress(ValueError):
+            scaled = attributes.get("type") == "ScaledInteger"
+            scaling[:] = [float(attributes.get("scale", 1)), float(attributes.get("offset", 0))] if scaled else [1, 0]
+        if path[:-1] == [*_SCANS, "vectorChild", "pose", "translation"]:
+            poses[-1][name] = 0.0  # what an element without a text says
+
+    def up(_name: str) -> None:
+        path.pop()
+
+    def text(part: str) -> None:
+        if path[:-1] == [*_SCANS, "vectorChild", "pose", "translation"]:
+            with suppress(ValueError):
+                poses[-1][path[-1]] = float(part) * scaling[0] + scaling[1]
+
+    parser = expat.ParserCreate()
+    parser.buffer_text = True
+    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = down, up, text
+    try:
+        parser.Parse(_xml(source).removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n"), True)
+    except (expat.ExpatError, LookupError):
+        return ()
+    places = [tuple(pose.get(axis, 0.0) for axis in "xyz") for pose in poses]
+    return tuple((x, y, z) if any((x, y, z)) and all(map(isfinite, (x, y, z))) else None for x, y, z in places)
 
 
 class _ExtremeError(Exception):

@@ -56,6 +56,9 @@ class PtxScan:
         What a row x y z 1 is multiplied by.
     skewed : bool
         Whether the matrix is more than a rotation and a move.
+    gridded : bool
+        Whether it has columns and rows, as a scanner sees them. Programs that write points of several scans as one
+        write one column, and no pose.
     """
 
     number: int
@@ -65,6 +68,7 @@ class PtxScan:
     line: int
     matrix: NDArray[np.float64]
     skewed: bool
+    gridded: bool
 
 
 def read_ptx(source: Input, scan: int | None = None) -> tuple[NDArray[np.void], dict[str, Any]]:
@@ -82,7 +86,7 @@ def read_ptx(source: Input, scan: int | None = None) -> tuple[NDArray[np.void], 
         `x`, `y`, `z` in float64, in the coordinates of the project, NaN where nothing was measured; `scan`, the number
         of the scan; and `intensity`, `red`, `green` and `blue` if a scan has them, 0 in scans that lack them.
     facts : dict
-        Keys of a `Source`: the unit, which is the metre, and what is in doubt.
+        Keys of a `Source`: the unit, which is the metre, the places of the scanners, and what is in doubt.
 
     Raises
     ------
@@ -103,7 +107,12 @@ def ptx_facts(scans: list[PtxScan]) -> dict[str, Any]:
     skewed = [str(one.number) for one in scans if one.skewed]
     which = f"scan {', '.join(skewed[:5])}{' and others' if len(skewed) > 5 else ''}"
     fault = f"the matrix of {which} is more than a rotation and a move: nothing is as large and as round as it was"
-    return {"units": "m", "doubts": ((fault, _AGAIN),) if skewed else ()}
+    places: list[tuple[float, float, float] | None] = [None] * (max(one.number for one in scans) + 1)
+    for one in scans:
+        if one.gridded or not np.array_equal(one.matrix, np.eye(4)):
+            x, y, z = (float(side) for side in one.matrix[3, :3])
+            places[one.number] = (x, y, z)
+    return {"units": "m", "stations": tuple(places), "doubts": ((fault, _AGAIN),) if skewed else ()}
 
 
 def ptx_columns(scans: list[PtxScan]) -> np.dtype[np.void]:
@@ -222,7 +231,7 @@ def _scan(source: Input, header: list[list[float]], line: int, number: int) -> P
         if width not in _WIDTHS:
             fault = f"expected x y z, an intensity and perhaps a colour, found {width} columns"
             raise InputError(f"{place}:{line}", fault, "give a PTX file as scanners write it")
-    return PtxScan(number, count, width, start, line, matrix, not off < _ORTHOGONAL)
+    return PtxScan(number, count, width, start, line, matrix, not off < _ORTHOGONAL, min(columns, rows) > 1)
 
 
 def _skip(source: Input, one: PtxScan) -> None:

@@ -17,6 +17,7 @@ from cylx.pipeline.candidates import (
 )
 from cylx.pipeline.rounds import Rounds
 from cylx.pipeline.stage_log import StageLog
+from cylx.pipeline.viewed import with_sides
 from cylx.records import (
     Candidates,
     Extraction,
@@ -92,7 +93,7 @@ def extract_cylinders(
         return extract_by_competitor(prepared, log)
     found = search_cylinders(prepared, log)
     with log.stage("labelling"):
-        return assemble(prepared, found.indexed, found.findings, found.rejected, log.reports, found.blends)
+        return with_sides(assemble(prepared, found.indexed, found.findings, found.rejected, log.reports, found.blends))
 
 
 def search_cylinders(prepared: Prepared, log: StageLog) -> Search:

@@ -96,6 +96,8 @@ class Source:
         Unit of length of the coordinates, a key of `cylx.units.METRES`; None if unknown.
     crs : Crs or None
         Their coordinate reference system; None if the file says none.
+    stations : tuple of (float, float, float) or None
+        Places of the scanners of its scans, by their numbers; None where it is unknown.
     """
 
     file: str
@@ -107,6 +109,7 @@ class Source:
     doubts: tuple[tuple[str, str], ...] = ()
     units: str | None = None
     crs: Crs | None = None
+    stations: tuple[tuple[float, float, float] | None, ...] = ()
 
 
 ARRAY = Source("<array>", "array")

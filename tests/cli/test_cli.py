@@ -24,13 +24,14 @@ COMMANDS = [
     "synth",
     "evaluate",
     "diff",
+    "deviation",
     "export",
     "doctor",
     "warmup",
     "reproduce",
 ]
 LEAVES = [
-    *(["extract"], ["info"], ["evaluate"], ["diff"], ["export"], ["doctor"], ["warmup"]),
+    *(["extract"], ["info"], ["evaluate"], ["diff"], ["deviation"], ["export"], ["doctor"], ["warmup"]),
     *(["config", name] for name in ("init", "show", "check", "schema")),
     *(["synth", name] for name in ("single", "multi")),
 ]

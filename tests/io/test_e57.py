@@ -69,7 +69,7 @@ def test_one_scan_can_be_chosen(scans):
 
 
 def test_a_scan_of_another_format_cannot_be_chosen(scan):
-    with pytest.raises(InputError, match="is not E57, so no scan can be chosen; leave --scan out"):
+    with pytest.raises(InputError, match="is neither E57 nor PTX, so no scan can be chosen; leave --scan out"):
         read_cloud(scan, scan=0)
 
 

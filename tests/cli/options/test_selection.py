@@ -135,7 +135,7 @@ def test_nothing_selected_is_one_line(run_cylx, scan):
 
 def test_a_scan_is_chosen_of_an_e57_file_only(run_cylx, scan):
     done = run_cylx("extract", scan, "--scan", "0")
-    fault = "is not E57, so no scan can be chosen; leave --scan out"
+    fault = "is neither E57 nor PTX, so no scan can be chosen; leave --scan out"
     assert (done.exit_code, done.stderr) == (3, f"cylx: {scan}: {fault}\n")
 
 
