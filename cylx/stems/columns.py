@@ -38,12 +38,14 @@ class Columns:
     def within(self, low: FloatArray, high: FloatArray) -> IndexArray:
         """Return the points of all cells that a box along the axes, between two corners (3,), touches."""
         first, last = self._cells(low, high)
-        parts = [np.empty(0, np.int64)]
+        if (last < first).any():
+            return np.empty(0, np.int64)
+        parts = []
         for i in range(int(first[0]), int(last[0]) + 1):
             for j in range(int(first[1]), int(last[1]) + 1):
                 row = (i * self._shape[1] + j) * self._shape[2]
                 parts.append(self._order[self._starts[row + first[2]] : self._starts[row + last[2] + 1]])
-        return np.concatenate(parts) if (last >= first).all() else parts[0]
+        return np.concatenate(parts)
 
     def slab(self, center: FloatArray, direction: FloatArray, reach: float, half: float) -> FloatArray:
         """Return the points (n, 3) within a distance of an axis, and less than a height from a place on it."""

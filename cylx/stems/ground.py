@@ -28,8 +28,6 @@ CELL = 0.5
 GROUND_CLASS = 2
 """Class of ground points in LAS."""
 STEEPEST = math.tan(math.radians(50.0))
-LEAST_SHARE_OF_CELLS = 0.02
-"""Points of class 2 in fewer cells than this share, of those that have points, are no classification of the ground."""
 STEPS = ((3.0, 1.0), (3.0, 0.5), (2.0, 0.35), (1.5, 0.25), (1.0, 0.2), (1.0, 0.15), (0.75, 0.12))
 """Standard deviation of the weights over the plane, and height at which a point above it loses its say; metres."""
 BELOW = 0.4
@@ -59,7 +57,7 @@ def find_ground(points: FloatArray, classes: NDArray[Any] | None, by: GroundBy) 
     Returns
     -------
     Ground
-        A grid that spans the cloud.
+        A grid that spans the cloud; found by the lowest points where no point is on the cloth, as of a single tree.
     """
     corner = np.floor(points[:, :2].min(axis=0) / CELL) * CELL
     shape = tuple(int(n) for n in np.floor((points[:, :2].max(axis=0) - corner) / CELL).astype(np.int64) + 1)
@@ -70,7 +68,11 @@ def find_ground(points: FloatArray, classes: NDArray[Any] | None, by: GroundBy) 
         from cylx.stems.cloth import on_cloth  # noqa: PLC0415  needs a library that may be missing
 
         z, u, v = lowest
-        lowest = np.where(on_cloth(z, u, v, CELL), z, math.nan), u, v
+        on = on_cloth(z, u, v, CELL)
+        if on.any():
+            lowest = np.where(on, z, math.nan), u, v
+        else:  # a tree alone: the cloth finds no ground at all
+            by = "lowest"
     heights = _surface(*lowest)
     return Ground(corner, CELL, heights, by)
 
@@ -184,7 +186,7 @@ def _at(surface: FloatArray, u: FloatArray, v: FloatArray) -> FloatArray:
 def _planes(
     z: FloatArray, u: FloatArray, v: FloatArray, weight: FloatArray, sigma: float, surface: FloatArray
 ) -> FloatArray:
-    """Return the height of a weighted plane about each cell; where too little is known, of one about more of them."""
+    """Return the height of a weighted plane about each cell, about more cells where little is known, or as it was."""
     from scipy.ndimage import gaussian_filter  # noqa: PLC0415  slow to import
 
     i, j = np.meshgrid(np.arange(z.shape[0]) + 0.5, np.arange(z.shape[1]) + 0.5, indexing="ij")
@@ -211,4 +213,4 @@ def _planes(
         take = enough & ~np.isfinite(out)
         right = np.stack([wh, xh, yh], axis=-1)
         out[take] = np.linalg.solve(matrix[take], right[take][..., None])[..., 0, 0] + base
-    return _filled(out) if not np.isfinite(out).all() else out
+    return np.where(np.isfinite(out), out, surface)

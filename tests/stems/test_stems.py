@@ -117,3 +117,14 @@ def test_sides_with_more_points_weigh_no_more():
     radius = 0.2 * (1 + 0.03 * np.cos(2 * angle)) + rng.normal(0, 0.002, len(angle))
     ring = fit_ring(np.column_stack([radius * np.cos(angle), radius * np.sin(angle)]), heights, (0.0, 0.0, 0.2))
     assert ring.radius == pytest.approx(0.2, rel=0.005)
+
+
+def test_a_tree_without_ground_stands_at_its_foot():
+    pytest.importorskip("CSF")
+    rng = np.random.default_rng(4)
+    angle, z = rng.uniform(-np.pi, np.pi, 20000), rng.uniform(0.0, 6.0, 20000)
+    stem = np.column_stack([0.15 * np.cos(angle), 0.15 * np.sin(angle), z + 3.7])
+    plot = find_stems(PointCloud(stem + rng.normal(0, 0.004, stem.shape)), ground="cloth")
+    (one,) = plot.stems
+    assert one.foot[2] == pytest.approx(3.7, abs=0.05)
+    assert one.dbh == pytest.approx(0.3, rel=0.01)
