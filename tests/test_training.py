@@ -429,15 +429,19 @@ def test_the_program_prints_what_can_be_pasted(tmp_path, monkeypatch, capsys):
 def test_arcs_have_weights_of_their_own(tmp_path, monkeypatch, capsys):
     rng = np.random.default_rng(12)
     fits, judged = [synthetic_line(rng, i) for i in range(300)], [synthetic_line(rng, i) for i in range(300)]
-    for name, lines in (("fits", fits), ("arcs", [{**line, "arc": True} for line in judged])):
+    both = [(line, opening) for opening in (0.0, 1.6) for line in judged]  # without the planes, and with them
+    arcs = [{**line, "arc": True, "measures": {**line["measures"], "arc": x, "edge_gain": 90.0}} for line, x in both]
+    for name, lines in (("fits", fits), ("arcs", arcs)):
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (tmp_path / f"{name}.jsonl").write_text(text, encoding="utf-8")
     names = [str(tmp_path / f"{name}.jsonl") for name in ("fits", "arcs")]
     monkeypatch.setattr(sys, "argv", ["fit.py", *names])
     assert fit.main() == 0
     out = capsys.readouterr().out
-    cylinders, blends = out[: out.index("BLEND_BIAS")], out[out.index("BLEND_BIAS") :]
-    for part, terms in ((cylinders, evidence_weights.TERMS), (blends, evidence_weights.BLEND_TERMS)):
+    cylinders, rest = out[: out.index("BLEND_BIAS")], out[out.index("BLEND_BIAS") :]
+    blends, profiles = rest[: rest.index("PROFILE_BIAS")], rest[rest.index("PROFILE_BIAS") :]
+    laws = (cylinders, evidence_weights.TERMS), (blends, evidence_weights.BLEND_TERMS)
+    for part, terms in (*laws, (profiles, evidence_weights.PROFILE_TERMS)):
         for term in terms:
             assert f'Term("{term.reason}", ' in part
         assert "| source | scenes | fits |" in part

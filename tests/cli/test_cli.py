@@ -18,6 +18,7 @@ from cylx.errors import BatchError, ConfigError, InputError, NothingFoundError, 
 COMMANDS = [
     "extract",
     "runs",
+    "stems",
     "view",
     "info",
     "config",
