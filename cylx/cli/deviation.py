@@ -213,7 +213,7 @@ def _said(of: str, value: float | None, uncertainty: float | None, tolerance: fl
     return f"{of} {number(value, 6)} ± {number(uncertainty, 2)} is above {number(tolerance, 6)}"
 
 
-def page(content: Deviations, cloud: PointCloud, found: list[Deviation], labels: Any, residuals: Any) -> str:  # noqa: ANN401
+def page(content: Deviations, cloud: PointCloud, found: list[Deviation], labels: Any, residuals: Any) -> str:  # noqa: ANN401  arrays; numpy is imported late
     """Return the report: the cloud and the cylinders found in 3-D, unrolled maps, and the tables."""
     import numpy as np
 

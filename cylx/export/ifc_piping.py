@@ -141,7 +141,7 @@ def _paths(part: Part) -> list[tuple[FloatArray, ...]]:
     return [path for path in part.lines if any((place != path[0]).any() for place in path)]
 
 
-def _curve(model: Model, part: Part, path: tuple[FloatArray, ...], origin: FloatArray) -> Any:  # noqa: ANN401
+def _curve(model: Model, part: Part, path: tuple[FloatArray, ...], origin: FloatArray) -> Any:  # noqa: ANN401  an entity of the library, which has no types
     """Make a centre line: the arc of a bend, or straight lines."""
     (solid,) = part.solids if len(part.solids) == 1 else (None,)
     if isinstance(solid, Bend):
@@ -181,7 +181,7 @@ def _solid(model: Model, solid: Solid, origin: FloatArray) -> tuple[str, Any]:
     raise TypeError("a mitre is more than one solid")
 
 
-def _rod(model: Model, start: FloatArray, along: FloatArray, radius: float, length: float) -> Any:  # noqa: ANN401
+def _rod(model: Model, start: FloatArray, along: FloatArray, radius: float, length: float) -> Any:  # noqa: ANN401  an entity of the library, which has no types
     """Make a rod."""
     place = _axes(model, start, along, axis_basis(along)[0])
     up = model.direction((0.0, 0.0, 1.0))
@@ -204,7 +204,7 @@ def _mitre(model: Model, mitre: Mitre, origin: FloatArray) -> list[Any]:
     return out
 
 
-def _circle(model: Model, radius: float, at: tuple[float, float] = (0.0, 0.0)) -> Any:  # noqa: ANN401
+def _circle(model: Model, radius: float, at: tuple[float, float] = (0.0, 0.0)) -> Any:  # noqa: ANN401  an entity of the library, which has no types
     """Make a disc in the plane of a solid."""
     center = model.make("IfcAxis2Placement2D", model.point(at))
     return model.make("IfcCircleProfileDef", "AREA", None, center, radius)

@@ -119,7 +119,7 @@ def piping_of(
         keys.setdefault(key[0], []).append(key)
     for number, fitting in sorted(layout.fittings.items()):
         if number in keys:
-            own = sorted(keys[number], key=lambda key, joins=fitting.joins: (joins.index(key[1]), key[2] == "high"))  # type: ignore[misc]
+            own = sorted(keys[number], key=lambda key, joins=fitting.joins: (joins.index(key[1]), key[2] == "high"))  # type: ignore[misc]  # a default binds the loop's value
             where |= {key: (len(parts), k) for k, key in enumerate(own)}
             of_fitting[number] = len(parts)
             parts.append(_fitting(fitting, own, layout))

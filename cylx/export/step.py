@@ -103,7 +103,7 @@ def _shape(solid: Solid) -> Any:  # noqa: ANN401  OCP has no types
     return BRepPrimAPI_MakeCone(place, solid.start_radius, solid.end_radius, solid.height).Shape()
 
 
-def _place(point: FloatArray, direction: FloatArray, across: FloatArray | None = None) -> Any:  # noqa: ANN401
+def _place(point: FloatArray, direction: FloatArray, across: FloatArray | None = None) -> Any:  # noqa: ANN401  an entity of the library, which has no types
     """Return a placement: a point, its z axis, and its x axis if that matters."""
     from OCP.gp import gp_Ax2, gp_Dir, gp_Pnt  # noqa: PLC0415  an extra
 

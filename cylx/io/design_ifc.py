@@ -124,7 +124,7 @@ def _polyline(curve: Any) -> list[Any]:  # noqa: ANN401  has no types
     return []
 
 
-def _ends(matrix: Any, start: Any, end: Any, radius: float) -> tuple[Any, Any, float]:  # noqa: ANN401
+def _ends(matrix: Any, start: Any, end: Any, radius: float) -> tuple[Any, Any, float]:  # noqa: ANN401  ifcopenshell has none
     """Return a rod where a matrix puts it."""
     scale = float(np.cbrt(abs(np.linalg.det(matrix[:3, :3]))))
     first, last = (matrix[:3, :3] @ one + matrix[:3, 3] for one in (start, end))

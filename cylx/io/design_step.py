@@ -93,7 +93,7 @@ def _bodies(document: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401  OCP ha
         yield from _parts(tool, labels.Value(number), TopLoc_Location(), "", 0)
 
 
-def _parts(tool: Any, label: Any, location: Any, name: str, depth: int) -> Iterator[tuple[str, Any]]:  # noqa: ANN401
+def _parts(tool: Any, label: Any, location: Any, name: str, depth: int) -> Iterator[tuple[str, Any]]:  # noqa: ANN401  OCP has no types
     """Yield name and shape of the parts of a label."""
     from OCP.TDF import TDF_Label  # noqa: PLC0415  an extra
 

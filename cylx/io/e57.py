@@ -178,7 +178,7 @@ def _check_counts(scans: list[_Scan], source: Input) -> None:
         raise InputError(source.place, fault, _REMEDY)
 
 
-def _pose(node: Any, number: int, place: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa: ANN401
+def _pose(node: Any, number: int, place: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # noqa: ANN401  pye57 has no types
     """Return rotation (3, 3) and translation (3,) of a scan; read by name, as the order in the file is not fixed."""
     rotation, translation = np.eye(3), np.zeros(3)
     try:

@@ -81,10 +81,8 @@ def finish(
         return "no fit"
     model, spread = fit
     _turn_as_given(model)
-    end, deviation = (
-        FIT_BEYOND_ENDS * segment.half,
-        max(spread, 1e-9 * model[RADIUS]),
-    )  # points may lie on the surface exactly
+    end = FIT_BEYOND_ENDS * segment.half
+    deviation = max(spread, 1e-9 * model[RADIUS])  # points may lie on the surface exactly
     limits = {
         "low": -end,
         "high": end,

@@ -84,7 +84,7 @@ class Layout:
 
     def _back(self, mark: tuple[int, ...]) -> bool:
         for built, count in zip((self.straights, self.joinings, self.ends, self.insulation), mark, strict=False):
-            del built[count:]  # type: ignore[attr-defined]
+            del built[count:]  # type: ignore[attr-defined]  # lists, of types that have no other in common
         self.space.cut(mark[4])
         return False
 
