@@ -241,6 +241,11 @@ def weigh_blend(measures: Mapping[str, float]) -> float:
     return 1.0 / (1.0 + math.exp(-min(max(odds, -50.0), 50.0)))
 
 
+def weigh_upright(measures: Mapping[str, float]) -> tuple[float, str]:
+    """Placeholder."""
+    return weigh(measures)
+
+
 def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     """Weigh the measures of a segment.
 

@@ -122,6 +122,8 @@ def fit_mixture(
         counts = np.zeros(BINS)
         _count_residuals(points, fitted, low, high, width, counts)
         law = estimate_law(counts, width, law)
+        if not law.deviation > 0.0:  # all of them are outliers
+            return None
         weights = law.weights(width, outliers=symmetric)
         for _ in range(STEPS_A_ROUND):
             sums = _Sums.of(points, fitted, low, high, width, weights)

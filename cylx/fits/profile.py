@@ -21,9 +21,21 @@ LEAST_ON_LINE, LEAST_ON_ARC = 12, 12
 """Points of a line and of the arc."""
 NEAR_LINE = 2.5
 """Points within so many deviations are on a line."""
-LINE_LENGTH = 2.0
-"""The lines count up to so many radii of the first circle past where they touch the arc."""
-CLEAR = 0.35
+LINE_LENGTHS = 0.4, 0.55, 0.75, 1.0, 1.4, 2.0
+"""The lines count up to so many radii of the first circle past where they touch the arc: as far as they go on so."""
+LAST_TO_START, TELLING = 4, 2.0
+"""Lines are first this short, as far as they have points and are longer, in radii, than so many roots of the deviation
+in radii: on less of it a bend is not seen."""
+FIRST_LENGTH = 1.0
+"""The same while it is looked for where to set out from."""
+LEAST_STRETCH, MOST_OFF, CLOSE = 6, 3.0, 4.0
+"""Points without which a line ends, deviations of their mean from it with which it ends, and deviations of each from it
+up to which they are asked."""
+AHEAD = 7.0
+"""Variance of a line that ends there, at the next points, over that of the mean of its own."""
+STRAIGHT_SHARE = 0.6
+"""Share of what is about the next stretch of a line that must lie on it."""
+CLEAR = 0.2
 """A line is known by what is further than this, in radii, past where it touches the arc."""
 OPENINGS = np.radians([45.0, 70.0, 100.0, 140.0, 180.0])
 """Angles of the arc from which the fit sets out."""
@@ -67,6 +79,8 @@ class Profile(NamedTuple):
         than that of the lines alone, which meet in an edge or go on, in squared deviations.
     chi_square : float
         Mean square of the residuals of what lies about the arc, in squared deviations, clipped.
+    reaches : ndarray of shape (2,)
+        Length of the lines at the first and the last end of the arc.
     """
 
     center: FloatArray
@@ -76,6 +90,7 @@ class Profile(NamedTuple):
     gain: float
     edge_gain: float
     chi_square: float
+    reaches: FloatArray
 
 
 def fit_profile(points: FloatArray, radius: float, middle: float, deviation: float) -> Profile | None:
@@ -100,30 +115,64 @@ def fit_profile(points: FloatArray, radius: float, middle: float, deviation: flo
     turn = np.array([[math.cos(middle), math.sin(middle)], [-math.sin(middle), math.cos(middle)]])
     local = np.ascontiguousarray(points @ turn.T)  # the arc's middle is on the first axis
     some = np.ascontiguousarray(local[:: 1 + len(local) // ENOUGH_TO_START])
-    reach = LINE_LENGTH * radius
+    reaches = np.full(2, FIRST_LENGTH * radius)
     starts = []
     for opening in OPENINGS:
         started = np.array([0.0, 0.0, radius, -0.5 * opening, 0.5 * opening])
-        if _settle(some, started, radius, reach, deviation):
-            starts.append((*_explained(some, started, reach, deviation), started))
+        if _settle(some, started, radius, reaches, deviation):
+            starts.append((*_explained(some, started, reaches, deviation), started))
     closest = min((scatter for _, scatter, _ in starts), default=0.0)
     # a circle too large may pass by more points, and scatters more
     alike = [(cost, started) for cost, scatter, started in starts if scatter <= ALIKE * closest]
     best = min(alike, key=lambda one: one[0], default=(0.0, None))[1]
-    if best is None or not _settle(local, best, radius, reach, deviation):
+    if best is None or not _grow(local, best, radius, reaches, deviation):
         return None
-    upper, lower, on_arc, about, squares, edge = _seen(local, best, reach, deviation)
+    upper, lower, on_arc, about, squares, edge = _seen(local, best, reaches, deviation)
     if min(upper, lower) < LEAST_ON_LINE or min(on_arc, about) < LEAST_ON_ARC:
         return None
-    least, _ = _explained(local, best, reach, deviation)
+    least, _ = _explained(local, best, reaches, deviation)
     first = np.array([0.0, 0.0, radius, best[FIRST], best[LAST]])
-    gain = _explained(local, first, reach, deviation)[0] - least
+    gain = _explained(local, first, reaches, deviation)[0] - least
     center = best[: CENTER_Y + 1] @ turn
     rotation, opening = 0.5 * (best[FIRST] + best[LAST]), 0.5 * (best[LAST] - best[FIRST])
-    return Profile(center, float(best[OWN]), middle + float(rotation), float(opening), gain, edge, squares / about)
+    return Profile(
+        center, float(best[OWN]), middle + float(rotation), float(opening), gain, edge, squares / about, reaches
+    )
 
 
-def tilt_of(points: FloatArray, heights: FloatArray, profile: Profile, reach: float, deviation: float) -> FloatArray:
+def _grow(local: FloatArray, profile: FloatArray, radius: float, reaches: FloatArray, deviation: float) -> bool:
+    """Fit a profile in place, its lines as long as they are straight; return whether it is one."""
+    least = TELLING * math.sqrt(deviation / radius)
+    start = profile.copy()
+    for first, shortest in enumerate(LINE_LENGTHS[:LAST_TO_START]):
+        if shortest < least and first + 1 < LAST_TO_START:
+            continue
+        profile[:], reaches[:] = start, shortest * radius
+        if _settle(local, profile, radius, reaches, deviation) and _has_lines(local, profile, reaches, deviation):
+            break
+    else:
+        return False
+    goes_on = [True, True]
+    for length in LINE_LENGTHS[first + 1 :]:
+        further = length * radius
+        for side in (0, 1):
+            goes_on[side] &= _is_straight(local, profile, side, reaches[side], further, deviation)
+            if goes_on[side]:
+                reaches[side] = further
+        if not any(goes_on):
+            break
+        if not _settle(local, profile, radius, reaches, deviation):
+            return False
+    return True
+
+
+def _has_lines(local: FloatArray, profile: FloatArray, reaches: FloatArray, deviation: float) -> bool:
+    """Return whether there are enough points on both lines clear of the arc."""
+    upper, lower, *_ = _seen(local, profile, reaches, deviation)
+    return min(upper, lower) >= LEAST_ON_LINE
+
+
+def tilt_of(points: FloatArray, heights: FloatArray, profile: Profile, deviation: float) -> FloatArray:
     """Return how much the axis leans against the points of a profile, in its plane, per unit of height.
 
     Parameters
@@ -132,8 +181,6 @@ def tilt_of(points: FloatArray, heights: FloatArray, profile: Profile, reach: fl
     heights : ndarray of shape (n,)
         Along the axis, from the middle.
     profile : Profile
-    reach : float
-        Length of the lines that counts.
     deviation : float
         Standard deviation of the points about the profile.
 
@@ -146,7 +193,7 @@ def tilt_of(points: FloatArray, heights: FloatArray, profile: Profile, reach: fl
         [*profile.center, profile.radius, profile.middle - profile.opening, profile.middle + profile.opening]
     )
     matrix, right = np.zeros((2, 2)), np.zeros(2)
-    _lean(np.ascontiguousarray(points), heights, own, reach, deviation, matrix, right)
+    _lean(np.ascontiguousarray(points), heights, own, profile.reaches, deviation, matrix, right)
     return right if solve_in_place(matrix, right) else np.zeros(2)
 
 
@@ -174,7 +221,7 @@ def _fill_normals(profile: FloatArray, normals: FloatArray) -> None:
 
 
 @njit(cache=True, nogil=True)
-def _settle(local: FloatArray, profile: FloatArray, radius: float, reach: float, deviation: float) -> bool:
+def _settle(local: FloatArray, profile: FloatArray, radius: float, reaches: FloatArray, deviation: float) -> bool:
     """Fit a profile in place, by Gauss-Newton steps with Tukey's weights; return whether it is one."""
     matrix, right, row, normals = np.zeros((5, 5)), np.zeros(5), np.zeros(5), np.zeros(4)
     for step in range(STEPS):
@@ -183,7 +230,7 @@ def _settle(local: FloatArray, profile: FloatArray, radius: float, reach: float,
         _fill_normals(profile, normals)
         for i in range(len(local)):
             kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
-            if abs(residual) >= width or along < 0.0 or along > reach:
+            if abs(residual) >= width or along < 0.0 or along > reaches[1 if kind > 0 else 0]:
                 continue
             row[OWN], row[FIRST], row[LAST] = -1.0, 0.0, 0.0
             if kind == 0:
@@ -219,11 +266,36 @@ def _settle(local: FloatArray, profile: FloatArray, radius: float, reach: float,
 
 
 @njit(cache=True, nogil=True)
+def _is_straight(
+    local: FloatArray, profile: FloatArray, side: int, reach: float, further: float, deviation: float
+) -> bool:
+    """Return whether the line at one end of an arc goes on straight from one length to another."""
+    normals = np.zeros(4)
+    _fill_normals(profile, normals)
+    own, near, close, total = 0, 0, 0, 0.0
+    for i in range(len(local)):
+        kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
+        if kind != 2 * side - 1 or along < 0.0 or along > further or abs(residual) >= 2.0 * CLOSE * deviation:
+            continue
+        if along <= reach:
+            own += abs(residual) < CLOSE * deviation
+            continue
+        near += 1
+        if abs(residual) < CLOSE * deviation:
+            close += 1
+            total += residual
+    if close < LEAST_STRETCH or close < STRAIGHT_SHARE * near:
+        return False
+    variance = deviation**2 * (1.0 / close + AHEAD / max(own, 1))
+    return bool(abs(total / close) <= MOST_OFF * math.sqrt(variance))
+
+
+@njit(cache=True, nogil=True)
 def _lean(
     local: FloatArray,
     heights: FloatArray,
     profile: FloatArray,
-    reach: float,
+    reaches: FloatArray,
     deviation: float,
     matrix: FloatArray,
     right: FloatArray,
@@ -233,7 +305,7 @@ def _lean(
     _fill_normals(profile, normals)
     for i in range(len(local)):
         kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
-        if abs(residual) >= width or along < 0.0 or along > reach:
+        if abs(residual) >= width or along < 0.0 or along > reaches[1 if kind > 0 else 0]:
             continue
         if kind == 0:
             x, y = local[i, 0] - profile[CENTER_X], local[i, 1] - profile[CENTER_Y]
@@ -253,7 +325,7 @@ def _lean(
 
 
 @njit(cache=True, nogil=True)
-def _explained(local: FloatArray, profile: FloatArray, reach: float, deviation: float) -> tuple[float, float]:
+def _explained(local: FloatArray, profile: FloatArray, reaches: FloatArray, deviation: float) -> tuple[float, float]:
     """Return the sum of squared residuals, clipped, in squared deviations, and the mean of those that are not clipped.
 
     In the sum, what is on no part of the profile counts as far.
@@ -262,9 +334,9 @@ def _explained(local: FloatArray, profile: FloatArray, reach: float, deviation: 
     _fill_normals(profile, normals)
     total, own, count = 0.0, 0.0, 0
     for i in range(len(local)):
-        _, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
+        kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
         ratio = min(abs(residual) / deviation, CLIPPED)
-        if along < 0.0 or along > reach:
+        if along < 0.0 or along > reaches[1 if kind > 0 else 0]:
             ratio = CLIPPED
         total += ratio * ratio
         if ratio < CLIPPED:
@@ -275,7 +347,7 @@ def _explained(local: FloatArray, profile: FloatArray, reach: float, deviation: 
 
 @njit(cache=True, nogil=True)
 def _seen(
-    local: FloatArray, profile: FloatArray, reach: float, deviation: float
+    local: FloatArray, profile: FloatArray, reaches: FloatArray, deviation: float
 ) -> tuple[int, int, int, int, float, float]:
     """Return what speaks for a profile.
 
@@ -301,7 +373,7 @@ def _seen(
             two = abs(x * normals[2] + y * normals[3] - profile[OWN])
             flat = min(one / deviation, two / deviation, CLIPPED)
             edge += flat * flat - ratio * ratio
-        elif near and CLEAR * profile[OWN] < along <= reach:
+        elif near and CLEAR * profile[OWN] < along <= reaches[1 if kind > 0 else 0]:
             upper += kind > 0
             lower += kind < 0
     return upper, lower, on_arc, about, squares, edge

@@ -97,7 +97,7 @@ def _maximise(
         if share < 1e-3:
             break
         broad, narrow = outside / mass, inside / max(total - mass, 1e-9 * total)
-        if abs(narrow - last) < SETTLED * narrow:
+        if abs(narrow - last) < SETTLED * narrow or not narrow > 0.0:
             break
     return narrow, broad, share
 

@@ -12,6 +12,7 @@ from cylx.segments.finishing import finish, inflation
 from cylx.segments.refitting import refit
 from cylx.stages.arcs import arcs_of
 from cylx.stages.averaging import ENOUGH_TO_JUDGE
+from cylx.stages.upright import upright_of
 from cylx.stages.verification import Verdict, may_be_arc, verify
 
 SHORTEST_PIECE = 5.0
@@ -101,6 +102,10 @@ class Judge:
                 arc = self._judge_arc(segment, support, payoff, goes_on=goes_on)
                 if arc is not None:
                     return arc
+        if reason and limits.enabled and not segment.upright:
+            standing = self._judge_upright(segment, support, payoff)
+            if standing is not None:
+                return standing
         if reason:
             confidence = verdict.confidence if verdict.measures else None
             return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
@@ -142,6 +147,14 @@ class Judge:
             if not verdict.reason and may_be_arc(verdict):
                 return _finding(arc, verdict, support, payoff)
         return None
+
+    def _judge_upright(self, segment: Segment, support: int, payoff: float) -> Finding | None:
+        """Verify a short segment as one that stands on a plane; None if it is none."""
+        held = upright_of(segment, self._indexed)
+        if held is None or self.out_of_range(held):
+            return None
+        verdict = verify(held, self._indexed, payoff, self._windows.agreement(held), self._limits)
+        return None if verdict.reason else _finding(held, verdict, support, payoff)
 
     def _refit(self, segment: Segment) -> Segment | str:
         return refit(segment, self._indexed, most=ENOUGH_TO_JUDGE)

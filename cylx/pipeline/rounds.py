@@ -22,6 +22,7 @@ from cylx.stages.consensus import of_one_surface
 from cylx.stages.extending import extend
 from cylx.stages.measuring import measure_extent
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
+from cylx.stages.upright import SURELY_UPRIGHT, upright_of
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
@@ -137,11 +138,16 @@ class Rounds:
 
     def _fit_average(self, cluster: Cluster, average: Segment, known: FloatArray) -> Fitted | RejectedSegment:
         support, payoff = len(cluster.members), cluster.payoff
-        if self._config.verification.enabled and self._judge.is_contradicted(average):
-            return RejectedSegment(average, "agreement", support, payoff)
-        fitted = (refine if self._config.averaging.refine else measure_extent)(average, self._indexed)
+        verified = self._config.verification.enabled
+        if verified and self._judge.is_contradicted(average):
+            fitted: Segment | str = "agreement"
+        else:
+            fitted = (refine if self._config.averaging.refine else measure_extent)(average, self._indexed)
         if isinstance(fitted, str):
-            return RejectedSegment(average, fitted, support, payoff)
+            held = upright_of(average, self._indexed, SURELY_UPRIGHT) if verified else None
+            if held is None:
+                return RejectedSegment(average, fitted, support, payoff)
+            fitted = held
         if self._removes and is_part_of(fitted, known):
             return RejectedSegment(fitted, FOUND_BEFORE, support, payoff)
         return Fitted(fitted, support, payoff, cluster.members)

@@ -46,6 +46,8 @@ class Segment:
     wedge : ndarray of shape (4,), optional
         Unit direction from the axis to the middle of an arc, and the cosine of half its angle: what lies beyond is of
         the planes that touch it. None for whatever is no such arc.
+    upright : bool
+        Whether it was fitted with its axis held to the normal of a plane.
     """
 
     model: FloatArray
@@ -55,6 +57,7 @@ class Segment:
     choice: Choice | None = None
     flat_share: float = 1.0
     wedge: FloatArray | None = None
+    upright: bool = False
 
     @property
     def point(self) -> FloatArray:

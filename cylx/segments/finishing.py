@@ -93,7 +93,7 @@ def finish(
     if likely is None:
         return refit(segment, indexed)
     prior = None if known is None else known.as_far_as_borne_out(likely)
-    if inflated == 1.0:
+    if inflated == 1.0 or segment.upright:
         prior = _upright(segment, indexed.planes, likely, prior)
     robust = inflated > 1.0 and prior is None
     if robust:
@@ -141,7 +141,7 @@ def _upright(segment: Segment, planes: FloatArray, fit: MixtureFit, known: Prior
     if abs(cosines[best]) < NEARLY_UPRIGHT:
         return known
     upright = Prior(direction=planes[best], direction_deviation=UPRIGHT_DEVIATION)
-    if upright.as_far_as_borne_out(fit, LEANING) is None:
+    if not segment.upright and upright.as_far_as_borne_out(fit, LEANING) is None:
         return known
     return (known or Prior())._replace(direction=planes[best], direction_deviation=UPRIGHT_DEVIATION)
 

@@ -47,7 +47,7 @@ def refit(segment: Segment, indexed: IndexedCloud, most: int | None = None, *, e
         return "no fit"
     model, spread = fit
     model[RADIUS] = unbiased_radius(model[RADIUS], min(spread, 0.5 * model[RADIUS]))
-    return replace(segment, model=model, spread=spread, covariance=None, choice=None)
+    return replace(segment, model=model, spread=spread, covariance=None, choice=None, upright=False)
 
 
 def shell_of(segment: Segment, indexed: IndexedCloud, most: int | None) -> tuple[FloatArray, float]:

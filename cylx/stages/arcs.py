@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cylx.fits.profile import LINE_LENGTH, fit_profile, tilt_of
+from cylx.fits.profile import fit_profile, tilt_of
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.geometry.numerics import fill_basis
@@ -91,7 +91,7 @@ def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
         profile = fit_profile(flat, float(model[RADIUS]), middle, deviation)
         if profile is None or profile.edge_gain < LEAST_GAIN:
             return None
-        lean = tilt_of(flat, heights, profile, LINE_LENGTH * float(model[RADIUS]), deviation)
+        lean = tilt_of(flat, heights, profile, deviation)
         wedge = _wedge(basis, profile.middle, profile.opening)
         model = model.copy()
         model[POINT] += profile.center @ basis

@@ -24,7 +24,7 @@ from cylx.evidence.measures import (
     shape_of,
 )
 from cylx.evidence.surroundings import continuation, emptiness, flank
-from cylx.evidence.weights import weigh, weigh_blend, weigh_profile
+from cylx.evidence.weights import weigh, weigh_blend, weigh_profile, weigh_upright
 from cylx.geometry.arrays import IndexArray
 from cylx.geometry.coverage import covered_angle
 from cylx.records import IndexedCloud, Segment
@@ -111,6 +111,8 @@ def verify(
     measures, errors = _measures_of(segment, shell, indexed, coverage, counts)
     known = {**measures, "coverage": coverage, "inliers": float(len(points)), "payoff": payoff}
     probability, worst = weigh(known)
+    if segment.upright:
+        probability, worst = weigh_upright(known)
     confidence = round(probability, 3)  # further digits would order equals by chance
     reason = broken_limit(measures, len(points), coverage, config)
     if arc:
