@@ -16,7 +16,7 @@ SECTORS = 12
 """Sectors of the turn of which each has an end."""
 CLEAN_SHARE = 0.85
 """Share of the sectors that must end at one height for the end to be a cut across the axis."""
-GAPS_OF_POINTS, ALLOWED_RADII = 3.0, 0.05
+GAPS_OF_POINTS, ALLOWED_RADII = 4.5, 0.05
 """They do if within so many usual gaps between points and this share of the radius."""
 RIM_RADII, BESIDE_RADII = 0.15, 0.3
 """What adjoins an end lies within so many radii of it, along and across the axis,"""

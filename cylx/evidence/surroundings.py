@@ -7,11 +7,13 @@ import math
 import numpy as np
 
 from cylx.evidence.measures import Shell
-from cylx.geometry.arrays import MaskArray
+from cylx.geometry.arrays import IndexArray, MaskArray
 from cylx.geometry.coverage import SECTORS, filled_sectors, sector_of
 
 PIECES_OF_HEIGHT = 10
 """Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
+SIDES = 4, 24
+"""Sides over which they are counted, too: least and most; each should hold `LEAST_ON` points."""
 THIRDS = 3
 """Pieces of the height over which flanks are counted: what touches a pipe at one place only is none."""
 MIDDLE = 0.9
@@ -33,9 +35,11 @@ END, END_DEVIATIONS, MOST_END = 0.02, 4.0, 0.4
 
 
 def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
-    """Return points inside and just outside as shares of those on the surface, medians over pieces of the height.
+    """Return points inside and just outside as shares of those on the surface.
 
-    Outside, points of planes do not count: a pipe may lie on a floor or run along a wall.
+    Medians over pieces of the height or over sides, whichever is less: what crosses at one height, or touches at one
+    side, such as a spoke or a web, is another thing. Outside, points of planes do not count: a pipe may lie on a floor
+    or run along a wall.
     """
     piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES_OF_HEIGHT).astype(np.int64), 0, PIECES_OF_HEIGHT - 1)
     piece[np.abs(shell.heights) > 1.0 - _end_of(shell, half)] = PIECES_OF_HEIGHT
@@ -48,9 +52,20 @@ def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     inside &= ~_on_other_wall(shell, inside, radius)
     if 6.0 * shell.deviation < CLEAR_WALL * radius:  # the wall of a rough surface could be anything
         outside &= ~_on_other_wall(shell, outside, radius, OUTER_SECTORS)
-    counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT + 1) for mask in (on, inside, outside)]
+    masks = on, inside, outside
+    counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT + 1) for mask in masks]
     if counts[0][:-1].any():  # caps and plates lie at the ends
         counts = [count[:-1] for count in counts]
+        masks = tuple(mask & (piece < PIECES_OF_HEIGHT) for mask in masks)
+    by_height = _median_shares(counts)
+    sides = int(np.clip(np.count_nonzero(masks[0]) // LEAST_ON, *SIDES))
+    side = np.clip(((shell.angles / (2.0 * math.pi) + 0.5) * sides).astype(np.int64), 0, sides - 1)
+    by_side = _median_shares([np.bincount(side[mask], minlength=sides) for mask in masks])
+    return min(by_height[0], by_side[0]), min(by_height[1], by_side[1])
+
+
+def _median_shares(counts: list[IndexArray]) -> tuple[float, float]:
+    """Return the medians, over pieces of a surface, of what is inside and outside as shares of what is on it."""
     full = counts[0] >= 1
     if not full.any():
         return 1.0, 1.0

@@ -214,6 +214,21 @@ PROFILE_TERMS = (
 )
 
 
+UPRIGHT_BIAS = 5.673
+UPRIGHT_TERMS = (
+    Term("noise", -11.596, 0.07, lambda m: _log(m["noise_ratio"], 1.0, 2.0)),
+    Term("form", -1.210, 0.00, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("oval", -42.225, 0.00, lambda m: min(m["ovality"], 0.05)),
+    Term("lack of fit", -1.943, 0.26, _misfit),
+    Term("facets", -1.005, 0.00, _facets),
+    Term("inside", -0.085, 0.52, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -1.994, 0.11, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("few points", 5.119, -0.17, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
+    Term("agreement", 2.556, -0.15, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
+    Term("slope", -6.0, 0.01, _slope),
+)
+
+
 def weigh_profile(measures: Mapping[str, float]) -> float:
     """Return the probability that an arc which was fitted with the two planes that touch it is a piece of a cylinder.
 
@@ -242,8 +257,22 @@ def weigh_blend(measures: Mapping[str, float]) -> float:
 
 
 def weigh_upright(measures: Mapping[str, float]) -> tuple[float, str]:
-    """Placeholder."""
-    return weigh(measures)
+    """Return the probability that what was fitted with its axis held to the normal of a plane is a cylinder.
+
+    Windows that see what it stands on, too, agree with it less; its few points scatter about it as about any surface.
+
+    Parameters
+    ----------
+    measures : mapping of str to float
+        As for `weigh`.
+
+    Returns
+    -------
+    confidence : float
+    worst : str
+        As from `weigh`.
+    """
+    return _weighed(UPRIGHT_TERMS, UPRIGHT_BIAS, measures)
 
 
 def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
@@ -273,8 +302,13 @@ def weigh(measures: Mapping[str, float]) -> tuple[float, str]:
     >>> confidence < 0.5, worst
     (True, 'agreement')
     """
-    odds, worst, least = BIAS, "", 0.0
-    for term in TERMS:
+    return _weighed(TERMS, BIAS, measures)
+
+
+def _weighed(terms: tuple[Term, ...], bias: float, measures: Mapping[str, float]) -> tuple[float, str]:
+    """Return the probability by a law, and the name of what speaks most against it."""
+    odds, worst, least = bias, "", 0.0
+    for term in terms:
         value = term.value(measures)
         odds += term.weight * value
         loss = term.weight * (value - term.usual)

@@ -22,6 +22,7 @@ from cylx.stages.consensus import of_one_surface
 from cylx.stages.extending import extend
 from cylx.stages.measuring import measure_extent
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
+from cylx.stages.parting import parted
 from cylx.stages.upright import SURELY_UPRIGHT, upright_of
 
 Item = TypeVar("Item")
@@ -203,13 +204,15 @@ class Rounds:
             longer = self._over_threads(lambda piece: extend(piece, self._indexed, self._judge.join), pieces)
             if any(one is not other for one, other in zip(longer, pieces, strict=True)):
                 pieces = merge_pieces(longer, self._indexed, self._judge.join)
+            apart = self._over_threads(lambda piece: parted(piece, self._indexed, self._judge.join), pieces)
+            joined = len(distinct) - len(pieces)
+            pieces = [piece for whole in apart for piece in whole]
             kept = drop_claimed(pieces, len(self._indexed.points))
             for before, after in ((findings, distinct), (pieces, kept)):
                 there = {id(finding) for finding in after}
                 lost = [one for one in before if id(one) not in there]
                 self.rejected += [RejectedSegment.of(one, "claimed by a better one") for one in lost]
-            joined = len(distinct) - len(pieces)
-            claimed = len(findings) - joined - len(kept)
+            claimed = len(findings) - len(distinct) + len(pieces) - len(kept)
         if self._config.averaging.refine:
             finished = self._over_threads(self._judge.finish, kept)
             reasons = [self._judge.out_of_range(one.segment) for one in finished]
