@@ -37,9 +37,9 @@ END, END_DEVIATIONS, MOST_END = 0.02, 4.0, 0.4
 def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     """Return points inside and just outside as shares of those on the surface.
 
-    Medians over pieces of the height or over sides, whichever is less: what crosses at one height, or touches at one
-    side, such as a spoke or a web, is another thing. Outside, points of planes do not count: a pipe may lie on a floor
-    or run along a wall.
+    Medians over pieces of the height, as lids, floors and crossings are other things; inside also over sides, if that
+    is less, as spokes and webs are. Outside, points of planes do not count: a pipe may lie on a floor or run along a
+    wall.
     """
     piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES_OF_HEIGHT).astype(np.int64), 0, PIECES_OF_HEIGHT - 1)
     piece[np.abs(shell.heights) > 1.0 - _end_of(shell, half)] = PIECES_OF_HEIGHT
@@ -61,7 +61,7 @@ def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     sides = int(np.clip(np.count_nonzero(masks[0]) // LEAST_ON, *SIDES))
     side = np.clip(((shell.angles / (2.0 * math.pi) + 0.5) * sides).astype(np.int64), 0, sides - 1)
     by_side = _median_shares([np.bincount(side[mask], minlength=sides) for mask in masks])
-    return min(by_height[0], by_side[0]), min(by_height[1], by_side[1])
+    return min(by_height[0], by_side[0]), by_height[1]
 
 
 def _median_shares(counts: list[IndexArray]) -> tuple[float, float]:

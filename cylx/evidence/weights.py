@@ -225,7 +225,7 @@ UPRIGHT_TERMS = (
     Term("outside", -1.994, 0.11, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
     Term("few points", 5.119, -0.17, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
     Term("agreement", 2.556, -0.15, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
-    Term("slope", -6.0, 0.01, _slope),
+    Term("slope", -10.0, 0.01, _slope),
 )
 
 

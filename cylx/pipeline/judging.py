@@ -22,6 +22,8 @@ UNEVEN, MOST_UNEVEN = 0.02, 0.1
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
 MOST_ARC = math.radians(270.0)
 """Angle of the surface from which a refused segment is no arc between two planes."""
+MOST_LOOSENED, LEAST_KEPT = 1.05, 0.85
+"""A short cylinder leans if, held upright, its points scatter more by this factor, or it loses more than the rest."""
 OF_FORM = frozenset(
     {"form", "agreement", "other shape", "cone, barrel or elbow", "lack of fit", "bend", "bulge", "slope", "facets"}
 )
@@ -102,9 +104,9 @@ class Judge:
                 arc = self._judge_arc(segment, support, payoff, goes_on=goes_on)
                 if arc is not None:
                     return arc
-        if reason and limits.enabled and not segment.upright:
+        if limits.enabled and verdict.measures and not segment.upright:
             standing = self._judge_upright(segment, support, payoff)
-            if standing is not None:
+            if standing is not None and (reason or _is_as_close(standing, verdict)):
                 return standing
         if reason:
             confidence = verdict.confidence if verdict.measures else None
@@ -158,6 +160,12 @@ class Judge:
 
     def _refit(self, segment: Segment) -> Segment | str:
         return refit(segment, self._indexed, most=ENOUGH_TO_JUDGE)
+
+
+def _is_as_close(standing: Finding, free: Verdict) -> bool:
+    """Return whether a cylinder held upright explains its points about as well as one that was fitted freely."""
+    alike = standing.measures["deviation_radii"] <= MOST_LOOSENED * free.measures["deviation_radii"]
+    return alike and len(standing.points) >= LEAST_KEPT * len(free.points)
 
 
 def _may_have_pieces(one: Finding | RejectedSegment) -> bool:

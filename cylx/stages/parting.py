@@ -89,6 +89,4 @@ def _piece(finding: Finding, heights: FloatArray, angles: FloatArray, low: float
     model = segment.model.copy()
     model[:3] += 0.5 * (ends[0] + ends[1]) * segment.direction
     piece = replace(segment, model=model, half=0.5 * (ends[1] - ends[0]), covariance=None)
-    return replace(
-        finding, segment=piece, points=finding.points[within], coverage=covered_angle(angles[within])
-    )
+    return replace(finding, segment=piece, points=finding.points[within], coverage=covered_angle(angles[within]))

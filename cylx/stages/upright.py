@@ -36,6 +36,8 @@ WITHIN = 2.0
 """What lies within so many deviations of the ends may be of a lid or a floor,"""
 MOST_END = 0.3
 """but no more than this share of half the height is left out."""
+CLEAR = 5.0
+"""The arc that is covered is told from what is so many deviations off the ends that were found, within that share."""
 REACH_SPACINGS, REACH_RADII = 3.0, 0.3
 """The ends are looked for so much further than they were."""
 SHORTEST = 0.5
@@ -108,11 +110,12 @@ def _held(segment: Segment, normal: FloatArray, indexed: IndexedCloud) -> tuple[
         low, high = ends
         on = (heights > low) & (heights < high)
         count = int(on.sum())
-        if covered_angle(angles[on]) < LEAST_COVERAGE:
-            return None
         half = 0.5 * (high - low)
         model[POINT] += 0.5 * (low + high) * normal
         if half < SHORTEST or half > SHORT * model[RADIUS]:
+            return None
+        clear = np.abs(heights - 0.5 * (low + high)) < half - min(CLEAR * noise, MOST_END * half)
+        if not clear.any() or covered_angle(angles[clear]) < LEAST_COVERAGE:
             return None
     held = replace(segment, model=model, half=half, spread=spread, covariance=None, choice=None, upright=True)
     return count, held

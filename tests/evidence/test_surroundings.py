@@ -120,3 +120,23 @@ def test_the_unit_is_no_matter(scale):
         for k in (1.0, scale)
     )
     assert one == pytest.approx(other)
+
+
+def spokes(rng, count, half, each=300):
+    """Draw the sides of webs that go inwards from a wall."""
+    way = 2 * np.pi * rng.integers(0, count, count * each) / count + rng.choice([-0.06, 0.06], count * each)
+    distances = rng.uniform(0.3, 1.0, count * each)
+    return rng.uniform(-half, half, count * each), distances, (way + np.pi) % (2 * np.pi) - np.pi
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("half", [0.3, 1.0])
+def test_spokes_and_webs_do_not_count(count, half):
+    rng = np.random.default_rng(0)
+    assert measured(wall(rng, half, 3000), spokes(rng, count, half), half=half)[0] < 0.05
+
+
+def test_what_lies_about_on_most_sides_counts():
+    rng = np.random.default_rng(0)
+    inside, _ = measured(wall(rng, 1.0, 3000), spokes(rng, 40, 1.0), half=1.0)
+    assert inside > 0.5

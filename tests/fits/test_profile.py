@@ -154,6 +154,44 @@ def test_the_lean_of_the_axis_is_seen_in_the_points(seed, x, y):
     points = rounded(rng, 90, 0.02)
     heights = rng.uniform(-2, 2, COUNT)
     profile = fit_profile(points, 1.0, 0.0, 0.02)
-    lean = tilt_of(points + heights[:, None] * [x, y], heights, profile, LENGTH, 0.02)
+    lean = tilt_of(points + heights[:, None] * [x, y], heights, profile, 0.02)
     assert lean == pytest.approx([x, y], abs=0.006)
-    assert tilt_of(np.empty((0, 2)), np.empty(0), profile, LENGTH, 0.02) == pytest.approx([0, 0])
+    assert tilt_of(np.empty((0, 2)), np.empty(0), profile, 0.02) == pytest.approx([0, 0])
+
+
+def rounded_box(rng, straight, noise, per_radius=110):
+    """Draw the outline of a square whose corners are rounded by arcs of radius 1; one arc's centre is zero."""
+    quarter = 0.5 * np.pi
+    count = round(4 * (quarter + straight) * per_radius)
+    along = (quarter + straight) * rng.random(count)
+    turn, past = np.minimum(along, quarter), np.maximum(along - quarter, 0.0)
+    corner = rng.integers(0, 4, count)
+    points = np.column_stack([np.cos(turn) - past * np.sin(turn), np.sin(turn) + past * np.cos(turn)])
+    points += 0.5 * straight  # of a square about zero
+    sines, cosines = np.array([0, 1, 0, -1])[corner], np.array([1, 0, -1, 0])[corner]
+    points = np.column_stack(
+        [cosines * points[:, 0] - sines * points[:, 1], sines * points[:, 0] + cosines * points[:, 1]]
+    )
+    return points - 0.5 * straight + noise * rng.standard_normal((count, 2))
+
+
+@pytest.mark.parametrize("straight", [0.6, 0.9, 1.5])
+@pytest.mark.parametrize("noise", [0.01, 0.025])
+def test_what_the_lines_go_on_into_does_not_draw_the_arc(straight, noise):
+    found = []
+    for seed in range(6):
+        points = rounded_box(np.random.default_rng(seed), straight, noise)
+        points = points[np.linalg.norm(points, axis=1) < 2.5]
+        profile = fit_profile(points + 0.1 * np.sqrt(0.5), 1.1, 0.25 * np.pi, noise)
+        assert (profile.reaches < straight + 0.5).all()
+        found.append(profile.radius)
+    assert np.median(found) == pytest.approx(1.0, abs=0.03)
+    assert found == pytest.approx(np.ones(6), abs=0.06)
+
+
+def test_a_line_counts_as_far_as_it_goes():
+    points = rounded(np.random.default_rng(0), 90, 0.02, count=2000)
+    assert fit_profile(points, 1.0, 0.0, 0.02).reaches == pytest.approx([2.0, 2.0])
+    cut = points[(points @ [-np.sqrt(0.5), -np.sqrt(0.5)] < 1.2)]
+    first, last = fit_profile(cut, 1.0, 0.0, 0.02).reaches
+    assert min(first, last) < 1.2 < max(first, last)
