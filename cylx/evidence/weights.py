@@ -214,17 +214,17 @@ PROFILE_TERMS = (
 )
 
 
-UPRIGHT_BIAS = 5.673
+UPRIGHT_BIAS = 5.725
 UPRIGHT_TERMS = (
-    Term("noise", -11.596, 0.07, lambda m: _log(m["noise_ratio"], 1.0, 2.0)),
-    Term("form", -1.210, 0.00, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
-    Term("oval", -42.225, 0.00, lambda m: min(m["ovality"], 0.05)),
-    Term("lack of fit", -1.943, 0.26, _misfit),
-    Term("facets", -1.005, 0.00, _facets),
-    Term("inside", -0.085, 0.52, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -1.994, 0.11, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("few points", 5.119, -0.17, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
-    Term("agreement", 2.556, -0.15, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
+    Term("noise", -12.596, 0.06, lambda m: _log(m["noise_ratio"], 1.0, 2.0)),
+    Term("form", -1.192, 0.00, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("oval", -55.839, 0.00, lambda m: min(m["ovality"], 0.05)),
+    Term("lack of fit", -2.394, 0.21, _misfit),
+    Term("facets", -6.420, 0.00, _facets),
+    Term("inside", -0.491, 0.40, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -1.805, 0.07, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("few points", 5.279, -0.22, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
+    Term("agreement", 2.155, -0.18, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
     Term("slope", -10.0, 0.01, _slope),
 )
 

@@ -23,6 +23,8 @@ MOST_DIRECTIONS = 6
 """Directions of planes that are tried."""
 ALIKE = math.cos(math.radians(4.0))
 """Normals that enclose a smaller angle are those of one direction."""
+BESIDE, LEAST_BESIDE = math.cos(math.radians(15.0)), 0.5
+"""A direction this near to another needs this share of its normals: edges show some that lean."""
 LEAST_SHARE = 0.02
 """Share of the points on planes that make a direction."""
 ENOUGH_NORMALS = 3000
@@ -179,6 +181,7 @@ def directions_of(normals: FloatArray) -> list[FloatArray]:
     normals = normals[:: 1 + len(normals) // ENOUGH_NORMALS]
     count = len(normals)
     found: list[FloatArray] = []
+    sizes: list[int] = []
     while len(normals) >= max(LEAST_SHARE * count, 10.0) and len(found) < MOST_DIRECTIONS:
         tried = normals[:: 1 + len(normals) // 200]
         alike = np.abs(tried @ normals.T) > ALIKE
@@ -190,7 +193,10 @@ def directions_of(normals: FloatArray) -> list[FloatArray]:
             _, vectors = np.linalg.eigh(own.T @ own)
             direction = vectors[:, 2]
             own = normals[np.abs(normals @ direction) > ALIKE]
-        found.append(direction)
+        beside = [size for one, size in zip(found, sizes, strict=True) if abs(one @ direction) > BESIDE]
+        if len(own) >= LEAST_BESIDE * max(beside, default=0):
+            found.append(direction)
+            sizes.append(len(own))
         normals = normals[np.abs(normals @ direction) <= ALIKE]
     return found
 

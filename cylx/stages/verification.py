@@ -21,6 +21,7 @@ from cylx.evidence.measures import (
     facets,
     look_at,
     own_scatter,
+    prism_share,
     shape_of,
 )
 from cylx.evidence.surroundings import continuation, emptiness, flank
@@ -35,6 +36,8 @@ GOES_ON = 0.25
 """Density of points past an end of an arc, as a share of its own, from which it goes on tangentially."""
 SURELY_GOES_ON = 0.5
 """The same, past one end alone, of what would pass for a cylinder."""
+CLOSED, DEVIATES = math.radians(300.0), 1.4
+"""Angle and lack of fit from which a surface may be that of a prism."""
 LEAST_SHARE = 1e-4
 """Deviation of form that is of no account, as a share of the radius."""
 ENOUGH_TO_MEASURE = 20000
@@ -148,7 +151,7 @@ def _measures_of(
         "structure_radii": structure / radius,
         "ovality": form["ovality"] / radius,
         "explained": form["explained"],
-        "prism": form["prism"],
+        "prism": _prism(shell, form, radius, max(noise, scatter), coverage),
         "facets": facets(shell, indexed.flatness, radius, scatter),
         "deviation_radii": deviation / radius,
         "inside": inside,
@@ -172,6 +175,13 @@ def _measures_of(
         "agreement": (consistent + 1.0) / (near + 2.0),
     }
     return measures, (shape["offset_error"], shape["tilt_error"])
+
+
+def _prism(shell: Shell, form: dict[str, float], radius: float, deviation: float, coverage: float) -> float:
+    """Return the share of the deviation of form that a prism explains; it is compared only where that is no noise."""
+    if coverage < CLOSED or form["lack_of_fit"] < DEVIATES:
+        return form["prism"]
+    return max(form["prism"], prism_share(shell, radius, deviation))
 
 
 def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:
