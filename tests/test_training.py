@@ -426,11 +426,12 @@ def test_the_program_prints_what_can_be_pasted(tmp_path, monkeypatch, capsys):
         fit.main()
 
 
-def test_arcs_have_weights_of_their_own(tmp_path, monkeypatch, capsys):
+def test_arcs_and_what_is_held_upright_have_weights_of_their_own(tmp_path, monkeypatch, capsys):
     rng = np.random.default_rng(12)
     fits, judged = [synthetic_line(rng, i) for i in range(300)], [synthetic_line(rng, i) for i in range(300)]
     both = [(line, opening) for opening in (0.0, 1.6) for line in judged]  # without the planes, and with them
     arcs = [{**line, "arc": True, "measures": {**line["measures"], "arc": x, "edge_gain": 90.0}} for line, x in both]
+    arcs += [{**line, "arc": False, "upright": True} for line in judged]
     for name, lines in (("fits", fits), ("arcs", arcs)):
         text = "".join(json.dumps(line) + "\n" for line in lines)
         (tmp_path / f"{name}.jsonl").write_text(text, encoding="utf-8")
@@ -439,9 +440,11 @@ def test_arcs_have_weights_of_their_own(tmp_path, monkeypatch, capsys):
     assert fit.main() == 0
     out = capsys.readouterr().out
     cylinders, rest = out[: out.index("BLEND_BIAS")], out[out.index("BLEND_BIAS") :]
-    blends, profiles = rest[: rest.index("PROFILE_BIAS")], rest[rest.index("PROFILE_BIAS") :]
+    blends, rest = rest[: rest.index("PROFILE_BIAS")], rest[rest.index("PROFILE_BIAS") :]
+    profiles, upright = rest[: rest.index("UPRIGHT_BIAS")], rest[rest.index("UPRIGHT_BIAS") :]
     laws = (cylinders, evidence_weights.TERMS), (blends, evidence_weights.BLEND_TERMS)
-    for part, terms in (*laws, (profiles, evidence_weights.PROFILE_TERMS)):
+    laws += (profiles, evidence_weights.PROFILE_TERMS), (upright, evidence_weights.UPRIGHT_TERMS)
+    for part, terms in laws:
         for term in terms:
             assert f'Term("{term.reason}", ' in part
         assert "| source | scenes | fits |" in part
@@ -562,7 +565,7 @@ def test_rows_of_a_part(program, tmp_path, monkeypatch):
     if program is real:
         assert {0, 1} & {line["cylinder"] for line in lines if line["label"] == labels.TRUE}
     terms = evidence_weights.BLEND_TERMS if program is arcs else evidence_weights.TERMS
-    assert all(fit.is_arc(line) == (program is arcs) for line in lines)
+    assert all((fit.law_of(line) != "BIAS") == (program is arcs) for line in lines)
     assert fit.table_of(lines, terms).terms.shape[1] == len(terms)
 
 

@@ -266,7 +266,7 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
     dict of str to float
         `lack_of_fit`: chi-square per cell; `structure`: the rms of what is structure in the residuals, frame units;
         `ovality`: the rms of an ellipse in it, frame units; `explained`: the largest share of it that a cone, a barrel,
-        a bent or an elliptic cylinder would explain, in [0, 1]; `prism`: the same of a prism of four to eight sides, 0
+        a bent or an elliptic cylinder would explain, in [0, 1]; `prism`: the same of a prism of five to eight sides, 0
         if the cylinder is not closed.
     """
     z, residuals, angles = shell.heights[shell.on], shell.residuals[shell.on], shell.angles[shell.on]
@@ -295,7 +295,7 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
     }
     # of a piece of the arc any smooth deviation would be explained by these
     closed = len(np.unique(turn)) >= CLOSED
-    prisms = [[np.cos(k * turn), np.sin(k * turn)] for k in range(4, 9)] if closed else []
+    prisms = [[np.cos(k * turn), np.sin(k * turn)] for k in range(5, 9)] if closed else []
     means = sums / counts[full] * weights
     left = _left_over(base, weights, means)
     gains = {

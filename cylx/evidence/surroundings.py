@@ -52,11 +52,11 @@ def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     inside &= ~_on_other_wall(shell, inside, radius)
     if 6.0 * shell.deviation < CLEAR_WALL * radius:  # the wall of a rough surface could be anything
         outside &= ~_on_other_wall(shell, outside, radius, OUTER_SECTORS)
-    masks = on, inside, outside
+    masks = [on, inside, outside]
     counts = [np.bincount(piece[mask], minlength=PIECES_OF_HEIGHT + 1) for mask in masks]
     if counts[0][:-1].any():  # caps and plates lie at the ends
         counts = [count[:-1] for count in counts]
-        masks = tuple(mask & (piece < PIECES_OF_HEIGHT) for mask in masks)
+        masks = [mask & (piece < PIECES_OF_HEIGHT) for mask in masks]
     by_height = _median_shares(counts)
     sides = int(np.clip(np.count_nonzero(masks[0]) // LEAST_ON, *SIDES))
     side = np.clip(((shell.angles / (2.0 * math.pi) + 0.5) * sides).astype(np.int64), 0, sides - 1)

@@ -18,7 +18,7 @@ from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSeg
 from cylx.scene import Prepared
 from cylx.stages.averaging import average_cluster, refine
 from cylx.stages.clustering import CandidateGame
-from cylx.stages.consensus import of_one_surface
+from cylx.stages.consensus import of_one_place, of_one_surface
 from cylx.stages.extending import extend
 from cylx.stages.measuring import measure_extent
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
@@ -116,13 +116,19 @@ class Rounds:
         return clusters
 
     def _of_one_surface(self, cluster: Cluster, average: Segment) -> tuple[Cluster, Segment]:
-        """Take one wall of a cluster of several, and put the members of the others back into the game."""
-        split = of_one_surface(self._game.candidates, cluster, average, self._indexed)
-        if split is None:
-            return cluster, average
-        one, others = split
-        self._game.restore(others)
-        return one, average_cluster(self._game.candidates, one, self._config.averaging)
+        """Take one wall and one place of a cluster of several, and put the other members back into the game."""
+        candidates, config = self._game.candidates, self._config.averaging
+        parts = of_one_surface(candidates, cluster, average, self._indexed)
+        if parts is not None:
+            cluster, others = parts
+            self._game.restore(others)
+            average = average_cluster(candidates, cluster, config)
+        parts = of_one_place(candidates, cluster, average)
+        if parts is not None:
+            cluster, others = parts
+            self._game.restore(others)
+            average = average_cluster(candidates, cluster, config)
+        return cluster, average
 
     def _withdraw(self, segment: Segment, *, closely: bool) -> None:
         """Take the candidates that a segment explains out of the game, but for those of another wall about its axis."""

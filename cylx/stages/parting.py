@@ -1,4 +1,4 @@
-"""A whole -> its pieces: two bores in line, or two collars of one shaft, that were followed across the gap between them.
+"""A whole -> its pieces: two bores in line, or two collars of a shaft, that were followed across their gap.
 
 A surface is followed across gaps, as most pipes are hidden in places. Where both sides of a gap are seen all round, and
 end there in a cut with something that adjoins it, nothing is hidden: there are two cylinders.

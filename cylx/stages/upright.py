@@ -31,7 +31,7 @@ HELD = math.radians(0.1)
 FITS = 3
 """Fits, each followed by a look at where the surface ends."""
 SHELL_NOISES, SHELL_RADII = 6.0, 0.12
-"""Half width of the shell of the first fit, whichever is more; the later ones are as wide as the noise alone asks for."""
+"""Half width of the shell of the first fit, whichever is more; of the later ones it is that of the noise."""
 WITHIN = 2.0
 """What lies within so many deviations of the ends may be of a lid or a floor,"""
 MOST_END = 0.3

@@ -17,7 +17,7 @@ def whole_of(*pieces, **how):
 def plated(*pieces, **how):
     """The same with plates at the ends of all pieces."""
     indexed, found, unit = findings_of(*pieces, **how)
-    joined, whole, _ = whole_of(*pieces, plates=False)
+    _, whole, _ = whole_of(*pieces, plates=False)
     points = np.sort(np.concatenate([one.points for one in found]))
     low = min(one[:, 2].min() for one in pieces)
     high = max(one[:, 2].max() for one in pieces)
@@ -51,10 +51,10 @@ def test_three_collars_are_three():
 
 def test_a_pipe_whose_middle_is_hidden_stays_one():
     pieces = piece(0, 3), piece(4, 7, seed=1)
-    indexed, found, unit = findings_of(*pieces, plates=False)
+    indexed, *_ = findings_of(*pieces, plates=False)
     _, whole, _ = plated(*pieces, plates=False)
     assert parted(whole, indexed, believe) == [whole]
-    indexed, whole, unit = plated(piece(0, 3, upper=ragged(1.0)), piece(4, 7, seed=1))
+    indexed, whole, _ = plated(piece(0, 3, upper=ragged(1.0)), piece(4, 7, seed=1))
     assert parted(whole, indexed, believe) == [whole]
 
 

@@ -56,6 +56,14 @@ def test_there_are_no_more_directions_than_are_tried():
     assert len(directions_of(normals)) == MOST_DIRECTIONS
 
 
+def test_a_few_normals_that_lean_are_of_edges_and_many_of_another_plane():
+    rng = np.random.default_rng(2)
+    leaning = [np.sin(np.radians(9.0)), 0.0, np.cos(np.radians(9.0))]
+    main = about([0, 0, 1], 900, 0.5, rng)
+    assert len(directions_of(np.concatenate([main, about(leaning, 150, 0.5, rng)]))) == 1
+    assert len(directions_of(np.concatenate([main, about(leaning, 700, 0.5, rng)]))) == 2
+
+
 def disc_on_a_plate(noise, seed):
     """Draw a disc that stands on a plate 2.8 radii wide; noise in spacings."""
     rng = np.random.default_rng(seed)

@@ -32,7 +32,7 @@ def disc(seed, rows, radius=8.0, sigma=0.2, turn_deg=360.0):
 
 
 def held(points, rows, start, planes=(UP,), sigma=0.2, half=None):
-    """Hold a segment upright that starts with an error (tilt in degrees, radius as a factor); in units of the points."""
+    """Hold a segment upright that starts with a tilt (degrees) and a radius; in units of the points."""
     frame, _ = make_frame(points, Config())
     unit = frame.spacing
     noise = Noise(np.ones(1), np.array([sigma / unit]))
@@ -73,7 +73,7 @@ def test_what_is_long_or_an_arc_is_not_held():
 
 
 def test_where_nothing_lies_there_is_none():
-    assert held(disc(0, 5.0) + [100.0, 0.0, 0.0], 5.0, (0.0, 8.0)) is None
+    assert held(disc(0, 5.0) + np.array([100.0, 0.0, 0.0]), 5.0, (0.0, 8.0)) is None
 
 
 @laws

@@ -1,7 +1,8 @@
-"""Run the pipeline on CAD parts and write one JSON line for each arc that was judged to be a blend, or to be none.
+"""Run the pipeline on CAD parts and write one JSON line for each verdict that is weighed by a law of its own.
 
 Rounds, fillets and slot ends go on tangentially, and are weighed by a law of their own. The pipeline keeps of them
-those that it accepts; here all verdicts on them are taken down. `fit.py` tells these lines from others by `arc`.
+those that it accepts; here all verdicts on them are taken down, and those on short cylinders that were held upright on
+a plane. `fit.py` tells these lines from others by `arc` and `upright`.
 """
 
 import argparse
@@ -21,13 +22,13 @@ from cylx.scene import prepare
 
 @contextmanager
 def noted():
-    """Take down the segments that are judged as arcs, with the verdicts and payoffs, for a while."""
+    """Take down the segments that are judged as arcs or held upright, with the verdicts and payoffs, for a while."""
     before, found = judging.verify, []
 
     def verify(segment, indexed, payoff, counts, config, *, arc=False):
         verdict = before(segment, indexed, payoff, counts, config, arc=arc)
-        if arc and verdict.measures:
-            found.append((segment, verdict, payoff))
+        if (arc or segment.upright) and verdict.measures:
+            found.append((segment, verdict, payoff, arc))
         return verdict
 
     judging.verify = verify
@@ -38,18 +39,19 @@ def noted():
 
 
 def rows_of(scan):
-    """Give a row for each verdict on an arc of a part."""
+    """Give a row for each verdict on an arc, or on what was held upright, of a part."""
     with noted() as found:
         extract_cylinders(scan.cloud, Config(), threads=1)  # in order, so that the rows are the same again
     frame = prepare(scan.cloud, Config()).frame
     rows = []
-    for segment, verdict, payoff in found:
+    for segment, verdict, payoff, arc in found:
         label, owner = scan.judge(frame.to_scene(segment.cylinder))
         own = {"coverage": verdict.coverage, "inliers": len(verdict.points), "payoff": payoff}
         rows.append(
             {
                 "scene": scan.name,
-                "arc": True,
+                "arc": arc,
+                "upright": segment.upright,
                 "label": label,
                 "cylinder": owner,
                 "measures": {key: float(value) for key, value in {**verdict.measures, **own}.items()},

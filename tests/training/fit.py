@@ -1,7 +1,8 @@
 """Fit the weights of `cylx.evidence` to rows of `collect.py`, `real.py`, `things.py` and `arcs.py`.
 
 The terms and their signs are those of `cylx.evidence.weights`, and the weights are fitted anew: of `TERMS` to fits, of
-`BLEND_TERMS` and `PROFILE_TERMS` to the arcs of `arcs.py`, without and with the planes that touch them. All tables are
+`BLEND_TERMS` and `PROFILE_TERMS` to the arcs of `arcs.py`, without and with the planes that touch them, and of
+`UPRIGHT_TERMS` to the short cylinders of that file that were held upright. All tables are
 cross-validated by scene: each fit is judged by weights that were found without its scene, and without others of the
 same thing, such as a CAD part under another noise. Fits of a true cylinder that need not be found, and those near one
 that are neither it nor something else, are counted and left out. So are arcs of CAD parts that go on tangentially,
@@ -23,7 +24,7 @@ sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 from tables import number, print_header, print_row
 
 from cylx.config import VerificationConfig
-from cylx.evidence.weights import BLEND_TERMS, PROFILE_TERMS, TERMS
+from cylx.evidence.weights import BLEND_TERMS, PROFILE_TERMS, TERMS, UPRIGHT_TERMS
 from cylx.stages.verification import GOES_ON
 
 LEAST = VerificationConfig().min_inliers
@@ -35,6 +36,12 @@ ARC = 3.7
 """Angle (radians) below which a true cylinder of them is one, if it goes on tangentially."""
 BLEND_STRENGTH = 0.5
 """Penalty for the weights of blends, as `STRENGTH`: there are fewer rows, and their terms say more."""
+LAWS = {
+    "BLEND_BIAS": (BLEND_TERMS, "arcs"),
+    "PROFILE_BIAS": (PROFILE_TERMS, "arcs with planes"),
+    "UPRIGHT_BIAS": (UPRIGHT_TERMS, "held upright"),
+}
+"""Laws beside that of fits: their terms, and what they are of."""
 PICTURE = Path(__file__).parents[2] / "docs" / "pictures" / "calibration.png"
 
 
@@ -43,7 +50,7 @@ def read_rows(paths):
     lines, scenes = [], set()
     for path in paths:
         fresh = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-        there = {(line["scene"], is_arc(line)) for line in fresh}
+        there = {(line["scene"], law_of(line)) for line in fresh}
         if there & scenes:
             names = sorted({scene for scene, _ in there & scenes})
             raise SystemExit(f"{path}: {', '.join(names)}: in another file, too; give it once")
@@ -51,9 +58,13 @@ def read_rows(paths):
     return lines
 
 
-def is_arc(line):
-    """Tell whether a line is a verdict on an arc."""
-    return line.get("arc", False)
+def law_of(line):
+    """Give the law that a line is for: that of fits, or of verdicts on arcs or on what was held upright."""
+    if line.get("upright", False):
+        return "UPRIGHT_BIAS"
+    if line.get("arc", False):
+        return "PROFILE_BIAS" if line["measures"]["arc"] > 0.0 else "BLEND_BIAS"
+    return "BIAS"
 
 
 def may_be_missed(line):
@@ -234,7 +245,7 @@ def main():
     """Fit, and print everything."""
     a = parse()
     lines = read_rows(a.rows)
-    fits, arcs = [line for line in lines if not is_arc(line)], [line for line in lines if is_arc(line)]
+    fits = [line for line in lines if law_of(line) == "BIAS"]
     if fits:
         rows, signs = table_of([line for line in fits if not may_be_missed(line)]), signs_of(TERMS)
         counts = Counter(line["label"] for line in fits)
@@ -245,10 +256,9 @@ def main():
             a.ablation.write_text(json.dumps(laws_without(rows, signs), indent=2) + "\n", encoding="utf-8")
         if a.plot:
             draw(probability, rows, a.plot)
-    if arcs:
-        laws = {"BLEND_BIAS": (BLEND_TERMS, "arcs", False), "PROFILE_BIAS": (PROFILE_TERMS, "arcs with planes", True)}
-        for bias, (terms, what, with_planes) in laws.items():
-            own = [line for line in arcs if (line["measures"]["arc"] > 0.0) == with_planes]
+    for bias, (terms, what) in LAWS.items():
+        own = [line for line in lines if law_of(line) == bias]
+        if own:
             rows, counts = table_of(own, terms), Counter(line["label"] for line in own)
             scenes = len(set(rows.scenes))
             print(f"\n{scenes} scenes, {len(own)} {what}: {', '.join(f'{n} {k}' for k, n in counts.items())}\n")
