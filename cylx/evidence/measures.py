@@ -29,11 +29,6 @@ BESIDE, LEAST_FREEDOM = 6.0, 8
 """Points whose mean each is compared with, and degrees of freedom without which that tells nothing."""
 CLOSED = 20
 """Sectors, of 24, that make a cylinder closed."""
-SIDES_OF_PRISMS, PHASES, ENOUGH_FOR_PRISM = (4, 5, 6, 8), 8, 1200
-"""Sides of the prisms that a surface is compared with, turns of each, and points that suffice for it."""
-MIDDLE, ABOUT, CLIPPED, EXPECTED = 0.9, 0.45, 4.0, 1.2
-"""It is compared over this share of the height, within so many radii of the surface; residuals count up to so many
-deviations; and no more than this is to be expected of a square of noise, some points being others'."""
 FLAT_RISE = 6.0
 """A flat window may hide a curve that rises by so many times the scatter."""
 FLAT_LEAST = 0.02
@@ -311,48 +306,6 @@ def deviations_of_form(shell: Shell, deviation: float) -> dict[str, float]:
         "ovality": math.sqrt(gains["oval"] / total),
         "explained": max(gains.values()) / left if left > 0.0 else 0.0,
     }
-
-
-def prism_share(shell: Shell, radius: float, deviation: float) -> float:
-    """Return the share of what points deviate from a cylinder that a regular prism explains, corners included.
-
-    The corners of a beam are too far off for the surface of a cylinder in it, and so its residuals do not show them.
-
-    Parameters
-    ----------
-    shell : Shell
-    radius : float
-        Frame units.
-    deviation : float
-        Of the noise, frame units.
-
-    Returns
-    -------
-    float
-        In [0, 1]; 0 if the points deviate no more than their noise.
-    """
-    about = np.flatnonzero((np.abs(shell.heights) < MIDDLE) & (np.abs(shell.residuals) < ABOUT * radius))
-    about = about[:: 1 + len(about) // ENOUGH_FOR_PRISM]
-    if len(about) == 0:
-        return 0.0
-    distances, angles = shell.residuals[about] + radius, shell.angles[about]
-    scale = max(deviation, 1e-9 * radius)
-
-    def misfit(residuals: FloatArray) -> float:
-        return float((np.minimum(np.abs(residuals) / scale, CLIPPED) ** 2).sum())
-
-    round_ = misfit(distances - radius)
-    excess = round_ - EXPECTED * len(about)
-    if excess <= 0.0:
-        return 0.0
-    best = round_
-    for sides in SIDES_OF_PRISMS:
-        wide = 2.0 * math.pi / sides
-        for phase in np.arange(PHASES) / PHASES * wide:
-            slant = np.cos((angles - phase) % wide - 0.5 * wide)  # of the distance, to that from the side
-            heights = distances * slant
-            best = min(best, misfit(heights - np.median(heights)))
-    return min(1.0, max(0.0, (round_ - best) / excess))
 
 
 def own_scatter(shell: Shell, radius: float, half: float, coverage: float) -> float:

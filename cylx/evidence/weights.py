@@ -16,7 +16,9 @@ was not among the terms then. No term may speak against its own meaning: the sig
 a true cylinder that were neither clearly it nor clearly another were left out, and so were arcs that go on
 tangentially: these have weights of their own, from the same CAD parts. Those that were fitted with the planes that
 touch them have others, from 1 760 verdicts on such arcs, one in eleven of them true, in 101 of these clouds: of two
-thirds of the parts, with noise of 0.2 spacings, some with less.
+thirds of the parts, with noise of 0.2 spacings, some with less. Short cylinders that were held upright on a plane have
+their own, from 3 965 verdicts, one in 36 of them true, in all of these parts with noise of 0.2 spacings; their slope
+weighs as that of others, as hardly any of these rows was a cone.
 
 The agreement was then measured at all sizes of windows that seemed large enough; since it is that of the size at which
 most agree, and a prism counts where noise hides its faces, the same weights were held against 25 000 fits anew: fitted

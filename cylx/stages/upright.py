@@ -18,14 +18,12 @@ from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, distances_to, points_on
 from cylx.geometry.extent import visible_extent
 from cylx.records import IndexedCloud, Segment
+from cylx.segments.finishing import NEARLY_UPRIGHT, SHORT
 from cylx.segments.refitting import LEAST_POINTS_OF_AVERAGE, own_points
 
-SHORT = 1.0
-"""A cylinder whose half height is less than so many radii is short."""
-NEARLY_UPRIGHT = math.cos(math.radians(12.0))
-"""Cosine of the angle to the normal of a plane up to which an axis may stand on it."""
 SURELY_UPRIGHT = math.cos(math.radians(2.0))
-"""The same for what could not be fitted freely, or is contradicted: it was laid about that normal."""
+"""Cosine of the angle to the normal of a plane up to which it is held what could not be fitted freely, or is
+contradicted: it was laid about that normal."""
 HELD = math.radians(0.1)
 """Standard deviation of the tilt of an axis that is held."""
 FITS = 3

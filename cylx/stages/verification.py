@@ -21,9 +21,9 @@ from cylx.evidence.measures import (
     facets,
     look_at,
     own_scatter,
-    prism_share,
     shape_of,
 )
+from cylx.evidence.prisms import prism_share
 from cylx.evidence.surroundings import continuation, emptiness, flank
 from cylx.evidence.weights import weigh, weigh_blend, weigh_profile, weigh_upright
 from cylx.geometry.arrays import IndexArray
