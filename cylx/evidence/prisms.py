@@ -9,8 +9,11 @@ import numpy as np
 from cylx.evidence.measures import Shell
 from cylx.geometry.arrays import FloatArray
 
-SIDES, PHASES, ENOUGH_FOR_PRISM = (4, 5, 6, 8), 8, 1200
+SIDES, PHASES, ENOUGH_FOR_PRISM = (4, 5, 6, 8), 16, 1200
 """Sides of the prisms that a surface is compared with, turns of each, and points that suffice for it."""
+MOST_LEFT, LEAST_SHARE = 2.0, 0.8
+"""A surface is a prism if its points deviate from that by no more than this, as mean square in squared deviations, and if
+it explains so much: what is rough is more like one of many prisms than like a cylinder, too."""
 MIDDLE, ABOUT, CLIPPED, EXPECTED = 0.9, 0.45, 4.0, 1.2
 """It is compared over this share of the height, within so many radii of the surface; residuals count up to so many
 deviations; and no more than this is to be expected of a square of noise, some points being others'."""
@@ -32,7 +35,7 @@ def prism_share(shell: Shell, radius: float, deviation: float) -> float:
     Returns
     -------
     float
-        In [0, 1]; 0 if the points deviate no more than their noise.
+        In [0, 1]; 0 if the points deviate no more than their noise, or if it is less than `LEAST_SHARE`.
     """
     about = np.flatnonzero((np.abs(shell.heights) < MIDDLE) & (np.abs(shell.residuals) < ABOUT * radius))
     about = about[:: 1 + len(about) // ENOUGH_FOR_PRISM]
@@ -55,4 +58,5 @@ def prism_share(shell: Shell, radius: float, deviation: float) -> float:
             slant = np.cos((angles - phase) % wide - 0.5 * wide)  # of the distance, to that from the side
             heights = distances * slant
             best = min(best, misfit(heights - np.median(heights)))
-    return min(1.0, max(0.0, (round_ - best) / excess))
+    share = min(1.0, max(0.0, (round_ - best) / excess))
+    return share if best <= MOST_LEFT * len(about) and share >= LEAST_SHARE else 0.0

@@ -8,7 +8,7 @@ from cylx.geometry.cells import Cells
 from cylx.records import Candidates, Cluster, IndexedCloud, Noise
 from cylx.scene import make_frame
 from cylx.stages.averaging import average_cluster
-from cylx.stages.consensus import of_one_surface
+from cylx.stages.consensus import of_one_place, of_one_surface
 
 SIGMA = 0.001
 """Noise; the radius is 1."""
@@ -95,3 +95,32 @@ def test_candidates_without_places_are_not_split():
     )
     assert np.isnan(bare.places).all()
     assert split(bare, indexed) is None
+
+
+def along_axis(heights, extent=0.2, radius=1.0):
+    """Give candidates about one axis at these heights, and what becomes of their cluster."""
+    rows = np.zeros((len(heights), 9))
+    rows[:, 2], rows[:, 5], rows[:, 6], rows[:, 7], rows[:, 8] = heights, 1.0, radius, 50, extent
+    candidates = Candidates.of_windows(rows, 0.5 * radius, rows[:, :3] + [radius, 0.0, 0.0])
+    cluster = Cluster(np.arange(len(heights)), np.full(len(heights), 1 / len(heights)), 0.8)
+    return of_one_place(candidates, cluster, average_cluster(candidates, cluster, AveragingConfig()))
+
+
+@pytest.mark.parametrize("gap", [2.0, 5.0, 50.0])
+def test_two_discs_far_apart_on_one_axis_are_two_places(gap):
+    rng = np.random.default_rng(0)
+    heights = np.concatenate([0.1 * rng.random(9), gap + 0.1 * rng.random(6)])
+    order = rng.permutation(15)
+    one, others = along_axis(heights[order])
+    assert sorted(order[one.members]) == list(range(9))
+    assert sorted(order[others]) == list(range(9, 15))
+    assert one.weights.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "heights",
+    [np.linspace(0, 50, 40), [*np.linspace(0, 3, 9), *np.linspace(6, 9, 9)], [0.0, 0.1, 40.0, 40.1], [0.0] * 20],
+    ids=["all along", "long pieces", "too few", "one place"],
+)
+def test_a_pipe_is_in_one_place(heights):
+    assert along_axis(np.array(heights)) is None
