@@ -12,8 +12,8 @@ from cylx.geometry.arrays import FloatArray
 SIDES, PHASES, ENOUGH_FOR_PRISM = (4, 5, 6, 8), 16, 1200
 """Sides of the prisms that a surface is compared with, turns of each, and points that suffice for it."""
 MOST_LEFT, LEAST_SHARE = 2.0, 0.8
-"""A surface is a prism if its points deviate from that by no more than this, as mean square in squared deviations, and if
-it explains so much: what is rough is more like one of many prisms than like a cylinder, too."""
+"""A surface is a prism if its points deviate from that by no more than this, as mean square in squared deviations, and
+if it explains so much: what is rough is more like one of many prisms than like a cylinder, too."""
 MIDDLE, ABOUT, CLIPPED, EXPECTED = 0.9, 0.45, 4.0, 1.2
 """It is compared over this share of the height, within so many radii of the surface; residuals count up to so many
 deviations; and no more than this is to be expected of a square of noise, some points being others'."""
