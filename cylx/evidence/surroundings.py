@@ -14,6 +14,8 @@ PIECES_OF_HEIGHT = 10
 """Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
 SIDES = 4, 24
 """Sides over which they are counted, too: least and most; each should hold `LEAST_ON` points."""
+HALF_SEEN = 0.5
+"""Share of the sides that must hold points of the surface: of a strip of something nearly flat all sides are empty."""
 THIRDS = 3
 """Pieces of the height over which flanks are counted: what touches a pipe at one place only is none."""
 MIDDLE = 0.9
@@ -38,8 +40,8 @@ def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     """Return points inside and just outside as shares of those on the surface.
 
     Medians over pieces of the height, as lids, floors and crossings are other things; inside also over sides, if that
-    is less, as spokes and webs are. Outside, points of planes do not count: a pipe may lie on a floor or run along a
-    wall.
+    is less and half a turn is seen, as spokes and webs are. Outside, points of planes do not count: a pipe may lie on a
+    floor or run along a wall.
     """
     piece = np.clip(((shell.heights + 1.0) / 2.0 * PIECES_OF_HEIGHT).astype(np.int64), 0, PIECES_OF_HEIGHT - 1)
     piece[np.abs(shell.heights) > 1.0 - _end_of(shell, half)] = PIECES_OF_HEIGHT
@@ -60,8 +62,10 @@ def emptiness(shell: Shell, radius: float, half: float) -> tuple[float, float]:
     by_height = _median_shares(counts)
     sides = int(np.clip(np.count_nonzero(masks[0]) // LEAST_ON, *SIDES))
     side = np.clip(((shell.angles / (2.0 * math.pi) + 0.5) * sides).astype(np.int64), 0, sides - 1)
-    by_side = _median_shares([np.bincount(side[mask], minlength=sides) for mask in masks])
-    return min(by_height[0], by_side[0]), by_height[1]
+    counts = [np.bincount(side[mask], minlength=sides) for mask in masks]
+    if np.count_nonzero(counts[0]) < HALF_SEEN * sides:
+        return by_height
+    return min(by_height[0], _median_shares(counts)[0]), by_height[1]
 
 
 def _median_shares(counts: list[IndexArray]) -> tuple[float, float]:
