@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -81,6 +82,11 @@ def _median_shares(counts: list[IndexArray]) -> tuple[float, float]:
 def _end_of(shell: Shell, half: float) -> float:
     """Return the share of half the height that a cap or a plate at its end takes."""
     return min(END + END_DEVIATIONS * shell.deviation / max(half, 1e-300), MOST_END)
+
+
+def clear_of_ends(shell: Shell, half: float) -> Shell:
+    """Return a shell whose surface is without what a cap or a plate at an end may have drawn out of its form."""
+    return replace(shell, on=shell.on & (np.abs(shell.heights) <= 1.0 - _end_of(shell, half)))
 
 
 def _on_other_wall(shell: Shell, aside: MaskArray, radius: float, sectors: int = WALL_SECTORS) -> MaskArray:

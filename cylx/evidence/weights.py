@@ -18,7 +18,7 @@ tangentially: these have weights of their own, from the same CAD parts. Those th
 touch them have others, from 1 760 verdicts on such arcs, one in eleven of them true, in 101 of these clouds: of two
 thirds of the parts, with noise of 0.2 spacings, some with less. Short cylinders that were held upright on a plane have
 their own, from 3 965 verdicts, one in 36 of them true, in all of these parts with noise of 0.2 spacings; their slope
-weighs as that of others, as hardly any of these rows was a cone.
+and bulge weigh as those of others, as hardly any of these rows was of a cone or a ball.
 
 The agreement was then measured at all sizes of windows that seemed large enough; since it is that of the size at which
 most agree, and a prism counts where noise hides its faces, the same weights were held against 25 000 fits anew: fitted
@@ -140,6 +140,15 @@ def _bulge(measures: Mapping[str, float]) -> float:
     return min(max(0.0, abs(measures["bulge"]) - excused), 0.3)
 
 
+def _barrel(measures: Mapping[str, float]) -> float:
+    """Return the bulge of what stands on a plane, up to one, beyond two standard errors or what form may have.
+
+    The band of a ball about its equator is as round as a disc; its bulge is one.
+    """
+    excused = max(2.0 * measures["bulge_error"], 2.0 * FORM / _height(measures) ** 2)
+    return min(max(0.0, measures["bulge"] - excused), 1.0)
+
+
 def _bend(measures: Mapping[str, float]) -> float:
     """Return the bend beyond two standard errors, or beyond what moves the ends by `FORM`; at most 0.2."""
     excused = max(2.0 * measures["bend_error"], 8.0 * FORM / _height(measures) ** 2)
@@ -228,6 +237,7 @@ UPRIGHT_TERMS = (
     Term("few points", 5.279, -0.22, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
     Term("agreement", 2.155, -0.18, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
     Term("slope", -10.0, 0.01, _slope),
+    Term("bulge", -8.147, 0.01, _barrel),
 )
 
 

@@ -24,7 +24,7 @@ from cylx.evidence.measures import (
     shape_of,
 )
 from cylx.evidence.prisms import prism_share
-from cylx.evidence.surroundings import continuation, emptiness, flank
+from cylx.evidence.surroundings import clear_of_ends, continuation, emptiness, flank
 from cylx.evidence.weights import weigh, weigh_blend, weigh_profile, weigh_upright
 from cylx.geometry.arrays import IndexArray
 from cylx.geometry.coverage import covered_angle
@@ -132,7 +132,8 @@ def _measures_of(
     radius = segment.radius
     noise = indexed.noise_about(segment.model, segment.half)
     deviation = float(np.sqrt((shell.residuals[shell.on] ** 2).mean())) / TRUNCATED
-    shape = shape_of(shell, segment, deviation)
+    clear = clear_of_ends(shell, segment.half) if segment.upright else shell
+    shape = shape_of(clear if clear.on.sum() >= LEAST_POINTS_TO_MEASURE else shell, segment, deviation)
     form = deviations_of_form(shell, deviation)
     structure = form["structure"]
     tangent, both = continuation(shell, radius)
