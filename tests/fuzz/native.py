@@ -130,7 +130,7 @@ def _pieces(raw):
 
 
 NATIVE_TARGETS = {
-    "las": (_las(), read_as("las")),
+    "las-native": (_las(), read_as("las")),
     "e57": (_e57(), read_as("e57")),
     "e57-inside": ([unpaged(seed) for seed in _e57()], read_inside_e57),
     "pcd-packed": (_packed(), read_as("pcd")),
