@@ -70,17 +70,17 @@ def pytest_xdist_auto_num_workers(config):
 
 @pytest.fixture(scope="session", autouse=True)
 def _kept_readers():
-    """Read LAS and E57 in processes that stay, as starting one for each file takes a quarter of a second."""
+    """Read LAS, E57 and designs in processes that stay, as starting one for each file takes a quarter of a second."""
     if not sys.platform.startswith("linux"):
         yield
         return
     from cylx.io import isolated
     from tests.support.kept_readers import KeptReaders
 
-    readers, fresh = KeptReaders(), isolated.read_isolated
-    isolated.read_isolated = readers.read_isolated
+    readers, fresh = KeptReaders(), (isolated.read_isolated, isolated.ask_isolated)
+    isolated.read_isolated, isolated.ask_isolated = readers.read_isolated, readers.ask_isolated
     yield
-    isolated.read_isolated = fresh
+    isolated.read_isolated, isolated.ask_isolated = fresh
     readers.close()
 
 
