@@ -157,5 +157,9 @@ NATIVE_TARGETS = {
     "e57-inside": ([unpaged(seed) for seed in _e57()], read_inside_e57),
     "pcd-packed": (_packed(), read_as("pcd")),
     "e57-xml": ([xml_of(seed) for seed in _e57()], read_e57_xml),
-    **{f"design-{kind}": (_models(kind), read_a_model(f".{kind}")) for kind, library in _LIBRARIES.items() if is_found(library)},
+    **{
+        f"design-{kind}": (_models(kind), read_a_model(f".{kind}"))
+        for kind, library in _LIBRARIES.items()
+        if is_found(library)
+    },
 }
