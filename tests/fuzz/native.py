@@ -1,4 +1,4 @@
-"""Targets whose readers are native code: E57, LAS and LAZ, STEP and IFC, read by processes that stay and die under their limits."""
+"""Targets whose readers are native code: E57, LAS, STEP and more, read by processes that stay and die under limits."""
 
 import atexit
 import os
@@ -9,8 +9,8 @@ from pathlib import Path
 
 from cylx.io import isolated
 from cylx.optional.extras import is_found
-from tests.support.e57 import paged, unpaged, with_xml, xml_of
 from tests.fuzz.targets import SCRATCH, SEEDS
+from tests.support.e57 import paged, unpaged, with_xml, xml_of
 from tests.support.kept_readers import KeptReaders
 
 READERS = KeptReaders()
