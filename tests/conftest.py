@@ -107,6 +107,18 @@ def extract_file(kept_extractions):
 
 
 @pytest.fixture
+def remembering(kept_extractions, monkeypatch):
+    """Let the same points be extracted once by the same settings, for tests about what is done with the cylinders."""
+    import cylx.api
+    import cylx.pipeline
+    from tests.support.warm import remembered
+
+    extract_once = remembered(cylx.pipeline.extract_cylinders, kept_extractions)
+    monkeypatch.setattr(cylx.pipeline, "extract_cylinders", extract_once)
+    monkeypatch.setattr(cylx.api, "extract_cylinders", extract_once)
+
+
+@pytest.fixture
 def run_cylx():
     """Run the command line in this process: `run_cylx("info", path)` gives exit_code, stdout and stderr."""
     from cylx.cli import main

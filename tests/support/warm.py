@@ -20,6 +20,7 @@ import socket
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 _CALL = """#!{python} -ISE
@@ -141,7 +142,8 @@ def remembered(extract, folder):
     def extract_once(cloud, config, *, threads=None, observer=None):
         observer = observer or SilentObserver()
         valid = b"" if cloud.valid is None else cloud.valid.tobytes()
-        about = f"{cloud.source!r} {cloud.rows} {config.model_dump_json()}".encode()
+        source = replace(cloud.source, file="")  # wherever it lies
+        about = f"{source!r} {cloud.rows} {config.model_dump_json()}".encode()
         path = folder / hashlib.sha256(b"|".join([cloud.points.tobytes(), valid, about])).hexdigest()
         if path.is_file():
             with path.open("rb") as file:
