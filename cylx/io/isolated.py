@@ -51,6 +51,7 @@ _LEAST_TABLE, _MOST_EXPANSION = 1 << 30, 100
 _TYPE = re.compile(r"[<>|][iuf][1248]")
 _LINUX = sys.platform.startswith("linux")
 _REMEDY = "get a complete copy of the file, or convert it to PLY with other software"
+_REMEDY_OF_DESIGN = "export the file again, or give the cylinders as CSV"
 _NAMES = {"las": "LAS", "e57": "E57", "pcd": "PCD", "step": "STEP", "ifc": "IFC"}
 _MODEL = {"step": 60, "ifc": 60}
 """Memory of the objects that a byte of a text becomes, in bytes."""
@@ -116,6 +117,7 @@ class Reader:
     def __init__(self, kind: str, file: IO[bytes]) -> None:
         self.kind = kind
         self.file = file
+        self._remedy = _REMEDY_OF_DESIGN if kind in _MODEL else _REMEDY
         self._stack = ExitStack()
         self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
@@ -168,9 +170,9 @@ class Reader:
         self._send(request | {"target": self._target_name})
         line = self._answer(4 * seconds + most // _TABLE_A_SECOND)
         if line is None:
-            raise InputError(source.place, "takes too long to read for a file of its size", _REMEDY)
+            raise InputError(source.place, "takes too long to read for a file of its size", self._remedy)
         if not line.endswith(b"\n"):
-            raise InputError(source.place, self._cause_of_death(), _REMEDY)
+            raise InputError(source.place, self._cause_of_death(), self._remedy)
         return self._accepted(source.place, json.loads(line))
 
     def _send(self, request: object) -> None:
@@ -207,7 +209,7 @@ class Reader:
         if "refused" in answer:
             raise InputError(*answer["refused"])
         if "memory" in answer:
-            raise InputError(place, "asks for more memory than a file of its size can need", _REMEDY)
+            raise InputError(place, "asks for more memory than a file of its size can need", self._remedy)
         if "bug" in answer:
             raise RuntimeError(answer["bug"])
         return answer
