@@ -70,7 +70,7 @@ def started(place):
                 command(place, out, "--jobs", "2"), cwd=place, stderr=subprocess.PIPE, start_new_session=True
             )
             running.append(process)
-            while process.poll() is None and len(list((place / out).glob("*.json"))) < 2:
+            while process.poll() is None and len(list((place / out).glob("[!.]*.json"))) < 2:
                 time.sleep(0.01)
             if process.poll() is None:
                 return process
