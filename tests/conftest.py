@@ -70,17 +70,17 @@ def pytest_xdist_auto_num_workers(config):
 
 @pytest.fixture(scope="session", autouse=True)
 def _kept_readers():
-    """Read LAS and E57 in processes that stay, as starting one for each file takes a quarter of a second."""
+    """Read LAS, E57 and designs in processes that stay, as starting one for each file takes a quarter of a second."""
     if not sys.platform.startswith("linux"):
         yield
         return
     from cylx.io import isolated
     from tests.support.kept_readers import KeptReaders
 
-    readers, fresh = KeptReaders(), isolated.read_isolated
-    isolated.read_isolated = readers.read_isolated
+    readers, fresh = KeptReaders(), (isolated.read_isolated, isolated.ask_isolated)
+    isolated.read_isolated, isolated.ask_isolated = readers.read_isolated, readers.ask_isolated
     yield
-    isolated.read_isolated = fresh
+    isolated.read_isolated, isolated.ask_isolated = fresh
     readers.close()
 
 
@@ -104,6 +104,18 @@ def extract_file(kept_extractions):
 
     extract_once = remembered(extract_cylinders, kept_extractions)
     return lambda path: extract_once(read_cloud(path), Config(), observer=SilentObserver())
+
+
+@pytest.fixture
+def remembering(kept_extractions, monkeypatch):
+    """Let the same points be extracted once by the same settings, for tests about what is done with the cylinders."""
+    import cylx.api
+    import cylx.pipeline
+    from tests.support.warm import remembered
+
+    extract_once = remembered(cylx.pipeline.extract_cylinders, kept_extractions)
+    monkeypatch.setattr(cylx.pipeline, "extract_cylinders", extract_once)
+    monkeypatch.setattr(cylx.api, "extract_cylinders", extract_once)
 
 
 @pytest.fixture

@@ -20,6 +20,9 @@ INTERRUPT = """
 import json, os, signal, sys
 import cylx.cli.terminal.stopwatch, cylx.pipeline
 from cylx.cli import main
+from cylx.api import warmup
+from cylx.records import SilentObserver
+warmup.warm_up(SilentObserver())
 stages, kept = json.loads(sys.argv.pop(1)), cylx.cli.terminal.stopwatch.Stopwatch
 for stage in stages:
     class Interrupted(kept):
@@ -33,7 +36,7 @@ for stage in stages:
         main(prog_name="cylx")
     print(stage, os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), flush=True)
 """
-"""A process with all imports that becomes another one for each stage."""
+"""A process with all imports and kernels that becomes another one for each stage."""
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +47,7 @@ def room(tmp_path_factory):
     from cylx.cli import main
 
     path = tmp_path_factory.mktemp("room") / "room.ply"
-    options = ["--points", "20000", "--cylinders", "3", "--coverage", "200", "--sigma", "0.001", "--seed", "3"]
+    options = ["--points", "10000", "--cylinders", "3", "--coverage", "200", "--sigma", "0.001", "--seed", "3"]
     assert CliRunner().invoke(main, ["synth", "multi", str(path), *options]).exit_code == 0
     return path
 
@@ -65,7 +68,7 @@ def test_cylinders_are_found_written_and_judged(run_cylx, room, scan):
     unknown = {"axis", "axis_sd_deg", "known_radius", "known_radius_sd", "catalogue"}
     assert {key for key, value in content["config"]["scene"].items() if value is None} == unknown
     vertices = PlyData.read(scan.with_suffix(".annotated.ply"))["vertex"]
-    assert len(vertices) == 20000
+    assert len(vertices) == 10000
     counts = np.bincount(vertices["cylinder_id"] + 1)[1:]
     assert counts.tolist() == [cylinder["inliers"] for cylinder in content["cylinders"]]
     truth = room.with_suffix(".truth.json")

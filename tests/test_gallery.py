@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "gallery.md"
 SCRIPTS = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 LARGEST = 150_000
+pytestmark = pytest.mark.usefixtures("remembering")
 
 
 @pytest.fixture

@@ -129,7 +129,9 @@ def test_two_turns_hide_no_pillar(seed):
 
 
 @needs_cases
-@pytest.mark.parametrize(("file", "radius", "count"), [("rods", 0.006, 5), ("scaffold", 0.024, 14)])
+@pytest.mark.parametrize(
+    ("file", "radius", "count"), [("rods", 0.006, 5), ("scaffold", 0.024, 14), ("scaffold_ground20", 0.024, 14)]
+)
 def test_thin_rods_alone_are_found(case, file, radius, count):
     assert radii(shapes(case("thin-rods-only", file))) == pytest.approx([radius] * count, rel=0.02)
 
@@ -169,8 +171,9 @@ def test_zeros_in_another_room_are_no_points(share, shift):
 
 @needs_cases
 def test_rings_and_profiles_give_nothing_false(case):
-    found = extract(case("profile-rings", "sensor_rot"))
-    assert radii(one.cylinder for one in (*found.cylinders, *found.blends)) == pytest.approx([20.0], rel=0.01)
+    for file in ("sensor", "sensor_rot"):
+        found = extract(case("profile-rings", file))
+        assert radii(one.cylinder for one in (*found.cylinders, *found.blends)) == pytest.approx([20.0], rel=0.01)
     assert all(abs(one.radius / 1.5 - 1) < 0.03 for one in shapes(case("profile-rings", "tunnel")))
 
 
@@ -195,10 +198,20 @@ def test_rings_that_lie_closer_are_a_tunnel(gap, count):
         ("rack", [((0.1 * i, 0, 0.05), (0, 1, 0), 0.05) for i in range(6)]),
         ("tunnel", [((0, 0, 0), (0, 1, 0), 3.0)]),
         ("few200", [((0, 0, 0), UP, 1.0)]),
+        ("rebar", [((0.1 * i, 0, 0.5), (0, 1, 0), 0.006) for i in range(5)]),
+        ("taper", []),
+        ("few60", []),
     ],
 )
 def test_pipes_in_on_and_beside_others_are_found(case, file, known):
     assert_are(shapes(case("algo-basic", file)), known)
+
+
+@needs_cases
+def test_a_quarter_of_a_pipe_between_two_floors_is_found(case):
+    found = extract(case("algo-basic", "buried90"))
+    middle = (0, 0, -0.15 * np.cos(np.radians(45)))
+    assert_are([one.cylinder for one in (*found.cylinders, *found.blends)], [(middle, (1, 0, 0), 0.15)], within=0.03)
 
 
 def test_another_pipe_in_a_pipe_is_found():

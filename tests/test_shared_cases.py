@@ -38,7 +38,7 @@ READ = {
     "las-quirks": [
         *(f"pf{point_format}.las" for point_format in range(11)), "v10.las", "v12.las", "v13.las", "laz7.laz",
         "renamed.laz", "v14_only_legacy.las", "v14_pf6_legacyset.las", "longrec.las", "twobytes.las", "tail.las",
-        "bbox.las", "extra.las",
+        "bbox.las", "extra.las", "scale1e9.las",
     ],
     "pcd-count0": ["a.pcd"],
     "ply-quirks": [
@@ -64,6 +64,7 @@ REFUSED = {
     "ply-quirks/more.ply": f": the header promises 20100 points, the file holds 20000; {COPY}",
     "ply-quirks/endheader.ply": f":7: 'end header' is not a line of a PLY header; {PLY}",
     "ply-quirks/half.ply": f":4: 'float16 x' is not a property type and name; {PLY}",
+    "ply-quirks/oneline.ply": ":8: expected 3 columns, found 60000; give every row the same columns",
     "ply-quirks/pxpypz.ply": ": the vertex element has no property x, y, z; give a PLY with x, y and z",
 }
 
@@ -111,6 +112,42 @@ def test_the_others_are_refused_in_one_line(made, name):
     with pytest.raises(InputError) as refused:
         read_cloud(path)
     assert str(refused.value) == f"{path}{REFUSED[name]}"
+
+
+@pytest.mark.parametrize(
+    ("name", "moved", "within"),
+    [
+        ("cm.las", (4e5, 5e6, 0), 0.0051),
+        ("mm_utm.las", (4e5, 5e6, 0), 0.00051),
+        ("off0_utm.las", (4e5, 5e5, 0), 0.00051),
+    ],
+)
+def test_map_coordinates_are_as_exact_as_their_steps(made, scene, name, moved, within):
+    assert np.abs(read_cloud(made("las-quirks") / name).points - scene() - moved).max() < within
+
+
+def test_a_negative_scale_is_a_mirror(made, scene):
+    points = read_cloud(made("las-quirks") / "negscale.las").points
+    assert np.abs(points * [-1, 1, 1] - scene()).max() < 6e-5
+
+
+def test_points_that_are_withheld_are_left_out_and_counted_and_come_back(made, scene, tmp_path, make_extraction):
+    cloud = read_cloud(made("las-quirks") / "withheld.las")
+    assert (len(cloud.points), cloud.rows) == (20000, 24000)
+    assert np.abs(cloud.points - scene()).max() < 6e-5
+    assert cloud.source.notes == ("4000 of 24000 points are marked as withheld, and left out",)
+    write_annotated(tmp_path / "out.las", make_extraction(cloud))
+    back = read_cloud(tmp_path / "out.las")
+    assert (back.table["withheld"] != 0).sum() == 4000
+    assert all(np.array_equal(back.table[axis], cloud.table[axis]) for axis in "xyz")
+    assert (back.table["cylinder_id"][back.table["withheld"] != 0] == -1).all()
+
+
+def test_blanks_among_the_numbers_of_a_binary_file_are_numbers(made, scene):
+    points = read_cloud(made("ply-quirks") / "binws.ply").points
+    odd = np.frombuffer(b"\n \n?", "<f4")[0]  # in place of the first of all numbers
+    assert np.isclose(points[0, 0], odd)
+    assert np.abs(points.ravel()[1:] - scene().ravel()[1:]).max() < 6e-6
 
 
 def test_fewer_points_are_read_where_the_header_counts_fewer(made, scene):

@@ -143,7 +143,10 @@ def second_process() -> Iterator[None]:
     if not (sys.executable and Path(sys.executable).stem.startswith("python")):
         yield  # an interpreter inside another program
         return
-    command = [sys.executable, "-c", f"from {__name__} import practise_the_end; practise_the_end()"]
+    # where modules are is said here: by itself it would look for them in the current folder first
+    places = [place for place in sys.path if place]
+    code = f"import sys; sys.path[:] = {places!r}; from {__name__} import practise_the_end; practise_the_end()"
+    command = [sys.executable, "-c", code]
     try:
         helper = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

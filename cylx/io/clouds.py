@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -15,6 +16,7 @@ from cylx.io.outputs import open_output
 from cylx.io.packed import unpacked
 from cylx.io.pcd import read_pcd, write_pcd
 from cylx.io.ply import ROWS_AT_A_TIME, ply_type, read_ply, write_ply
+from cylx.io.withheld import withheld_rows
 from cylx.io.xyz import read_xyz, write_xyz
 from cylx.optional.extras import require
 from cylx.records import PointCloud, Selection, Source
@@ -175,6 +177,13 @@ def _cloud(table: NDArray[np.void], place: str, source: Source) -> PointCloud:
     valid = np.asarray(np.isfinite(points).all(axis=1))
     if not valid.any():
         raise InputError(place, "no point has finite coordinates", "export the file again")
+    withheld = withheld_rows(table, source.format)
+    if withheld.any():
+        valid &= ~withheld
+        if not valid.any():
+            raise InputError(place, "marks all its points as withheld", "give a scan with points that may be used")
+        note = f"{withheld.sum()} of {len(table)} points are marked as withheld, and left out"
+        source = replace(source, notes=(*source.notes, note))
     if not valid.all():
         return PointCloud(points[valid], table, valid, source)
     bare = names == ("x", "y", "z") and all(table.dtype[name] == np.float64 for name in names)

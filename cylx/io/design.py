@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cylx.errors import InputError, UsageError
+from cylx.io import isolated
 from cylx.io.design_parts import KEYS, design_cylinder, triple
 from cylx.io.inputs import excerpt, open_input, printable, read_json
 from cylx.optional.extras import require
@@ -46,20 +47,27 @@ def read_design(path: str | Path) -> Design:
     elif suffix == ".csv":
         design = _from_csv(path, place)
     elif suffix in {".step", ".stp"}:
-        from cylx.io.design_step import read_step  # noqa: PLC0415  an extra
-
-        require("OCP", place=place, needed_by="a design in STEP")
-        design = read_step(path)
+        require("OCP", place=place, needed_by="a design in STEP", imported=False)
+        design = _isolated(path, "step")
     elif suffix == ".ifc":
-        from cylx.io.design_ifc import read_ifc  # noqa: PLC0415  an extra
-
-        require("ifcopenshell", place=place, needed_by="a design in IFC")
-        design = read_ifc(path)
+        require("ifcopenshell", place=place, needed_by="a design in IFC", imported=False)
+        design = _isolated(path, "ifc")
     else:
         raise UsageError(place, "is no format of a design", f"use one of {', '.join(SUFFIXES)}")
     if not design.cylinders:
         raise InputError(place, "has no cylinder", "give a design with straight pipes or other cylinders")
     return design
+
+
+def _isolated(path: str | Path, kind: str) -> Design:
+    """Read a design by a library in native code, in a process of its own."""
+    with open_input(path) as source:
+        answer = isolated.ask_isolated(source, kind)
+    found = (
+        DesignCylinder(str(name), triple(start), triple(end), float(radius))
+        for name, start, end, radius in answer["cylinders"]
+    )
+    return Design(kind, answer["units"], answer["metres"], tuple(found))
 
 
 def _from_json(document: Mapping[str, Any], place: str) -> Design:

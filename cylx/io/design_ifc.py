@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.design_parts import design_cylinder
-from cylx.io.inputs import open_input, printable
+from cylx.io.inputs import Input
 from cylx.records.designs import Design, DesignCylinder
 from cylx.units import unit_of
 
@@ -21,10 +20,14 @@ _STRAIGHT = 1e-6
 _SAME = 1e-9
 
 
-def read_ifc(path: str | Path) -> Design:
+def read_ifc(source: Input) -> Design:
     """Read the circles that are swept along straight lines in the bodies of the products of an IFC file.
 
     Of hollow profiles the outer circle counts. With an `IfcMapConversion`, the coordinates are those of the map.
+
+    Parameters
+    ----------
+    source : Input
 
     Raises
     ------
@@ -35,9 +38,8 @@ def read_ifc(path: str | Path) -> Design:
     from ifcopenshell.util.placement import get_local_placement  # noqa: PLC0415  an extra
     from ifcopenshell.util.unit import calculate_unit_scale  # noqa: PLC0415  an extra
 
-    place = printable(path)
-    with open_input(path) as source:
-        text = source.head(source.size).decode("utf-8", "replace")
+    place = source.place
+    text = source.head(source.size).decode("utf-8", "replace")
     if not text.lstrip().startswith("ISO-10303-21"):
         raise InputError(place, "is not IFC: it does not begin with ISO-10303-21", "give it its right suffix")
     try:

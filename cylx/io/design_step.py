@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.design_parts import design_cylinder
-from cylx.io.inputs import open_input, printable
+from cylx.io.inputs import Input
 from cylx.records.designs import Design
 
 _MILLIMETRE = 0.001
@@ -35,11 +34,16 @@ class _Face:
     bore: bool
 
 
-def read_step(path: str | Path) -> Design:
+def read_step(source: Input) -> Design:
     """Read the cylinders of the solids of a STEP file.
 
     Faces about one axis with one radius are one cylinder if they touch along it. Bores are left out where a pin about
     the same axis is around them: of a pipe the outer surface counts.
+
+    Parameters
+    ----------
+    source : Input
+        A file that has a name in this process, which Open CASCADE may end: see `cylx.io.isolated`.
 
     Raises
     ------
@@ -52,9 +56,8 @@ def read_step(path: str | Path) -> Design:
     from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415  an extra
     from OCP.TDocStd import TDocStd_Document  # noqa: PLC0415  an extra
 
-    place = printable(path)
-    with open_input(path) as source:
-        head = source.head(4096)
+    place = source.place
+    head = source.head(4096)
     if not head.lstrip().startswith(b"ISO-10303-21"):
         raise InputError(place, "is not STEP: it does not begin with ISO-10303-21", "give it its right suffix")
     for printer in Message.DefaultMessenger_s().Printers():
@@ -63,7 +66,7 @@ def read_step(path: str | Path) -> Design:
     reader = STEPCAFControl_Reader()
     reader.SetNameMode(True)
     try:
-        done = reader.ReadFile(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone and reader.Transfer(document)
+        done = reader.ReadFile(str(source.path)) == IFSelect_ReturnStatus.IFSelect_RetDone and reader.Transfer(document)
         bodies = list(_bodies(document)) if done else []
     except (ImportError, AttributeError, TypeError):  # this program and Open CASCADE do not fit
         raise

@@ -54,6 +54,10 @@ _SQLITE = Foreign("a database of SQLite", "export the points as CSV")
 _HTML = Foreign("a web page", "download the scan itself")
 _XML = Foreign("XML", "export the points as PLY")
 _JSON = Foreign("JSON", "give the scan, not a result of cylx or other data")
+_ARROW = Foreign("a table of Arrow", "save it as CSV")
+_GRID = Foreign("a raster of heights", "convert it to text of x y z")
+_NETCDF = Foreign("NetCDF", "save the points as NPY")
+_DRACO = Foreign("a cloud or mesh packed by Draco", "decode it to PLY with 'draco_decoder'")
 _LFS = Foreign("a pointer of Git LFS, not the file itself", "fetch it by 'git lfs pull'")
 _PROGRAM = Foreign("a program", "give a scan")
 
@@ -99,7 +103,10 @@ BY_SUFFIX = {
     **dict.fromkeys((".pod", ".cl3", ".clr", ".imp", ".pcg", ".dp"), Foreign("a scan of another program", _EXPORT)),
     **dict.fromkeys((".bpf", ".sbet", ".pts.bin"), Foreign("a scan of another program", _EXPORT)),
     **dict.fromkeys((".pkl", ".pickle", ".pt", ".pth"), Foreign("Python objects", "save the points by numpy.save")),
-    **dict.fromkeys((".parquet", ".feather", ".arrow"), Foreign("a table of Arrow", "save it as CSV")),
+    **dict.fromkeys((".parquet", ".feather", ".arrow"), _ARROW),
+    **dict.fromkeys((".grd", ".dem"), _GRID),
+    **dict.fromkeys((".nc",), _NETCDF),
+    **dict.fromkeys((".drc",), _DRACO),
 }
 """Suffixes in lower case."""
 _MAGIC = (
@@ -130,6 +137,16 @@ _MAGIC = (
     (b"SQLite format 3", _SQLITE),
     (b"\xd0\xcf\x11\xe0", _OFFICE),
     (b"\x00\x00\x27\x0a", _SHP),
+    (b"PAR1", _ARROW),
+    (b"ARROW1", _ARROW),
+    (b"FEA1", _ARROW),
+    (b"CDF\x01", _NETCDF),
+    (b"CDF\x02", _NETCDF),
+    (b"CDF\x05", _NETCDF),
+    (b"DRACO", _DRACO),
+    (b"DSAA", _GRID),
+    (b"DSBB", _GRID),
+    (b"DSRB", _GRID),
     (b"version https://git-lfs", _LFS),
     (b"\x7fELF", _PROGRAM),
     (b"COFF\n", _OFF),
@@ -137,6 +154,7 @@ _MAGIC = (
     (b"OFF\r", _OFF),
 )
 _HTML_START = re.compile(rb"\s*<(!doctype html|html)", re.IGNORECASE)
+_GRID_START = re.compile(rb"n(cols|rows)[ \t]+\d+\s+n(cols|rows)[ \t]+\d", re.IGNORECASE)
 _VERTEX = re.compile(rb"^v([ \t]+[-+.\d][-+.\deE]*){3}", re.MULTILINE)
 _FACE = re.compile(rb"^(f[ \t]+\d|vn[ \t]|vt[ \t]|mtllib[ \t]|o[ \t]|g[ \t])", re.MULTILINE)
 _DXF_START = re.compile(rb"\s*(0|999[\r\n].*?)\s*[\r\n]+\s*(0\s*[\r\n]+\s*)?SECTION", re.DOTALL)
@@ -176,6 +194,8 @@ def foreign_content(head: bytes) -> Foreign | None:
         return _STL
     if _HTML_START.match(text):
         return _HTML
+    if _GRID_START.match(text):
+        return _GRID
     if text.startswith((b"<?xml", b"<VTKFile")):
         return _VTK if b"<VTKFile" in text else _XML
     if text.startswith((b'{"', b"{\n", b"{\r", b"[{", b"{ ")):

@@ -51,7 +51,10 @@ _LEAST_TABLE, _MOST_EXPANSION = 1 << 30, 100
 _TYPE = re.compile(r"[<>|][iuf][1248]")
 _LINUX = sys.platform.startswith("linux")
 _REMEDY = "get a complete copy of the file, or convert it to PLY with other software"
-_NAMES = {"las": "LAS", "e57": "E57", "pcd": "PCD"}
+_REMEDY_OF_DESIGN = "export the file again, or give the cylinders as CSV"
+_NAMES = {"las": "LAS", "e57": "E57", "pcd": "PCD", "step": "STEP", "ifc": "IFC"}
+_MODEL = {"step": 60, "ifc": 60}
+"""Memory of the objects that a byte of a text becomes, in bytes."""
 
 
 def read_isolated(source: Input, kind: str, **wanted: int | None) -> NDArray[np.void]:
@@ -79,12 +82,34 @@ def read_isolated(source: Input, kind: str, **wanted: int | None) -> NDArray[np.
         return reader.read(source, **wanted)
 
 
+def ask_isolated(source: Input, kind: str) -> dict[str, Any]:
+    """Read a design in a process of its own.
+
+    Parameters
+    ----------
+    source : Input
+    kind : {"step", "ifc"}
+
+    Returns
+    -------
+    dict
+        See `cylx.io.isolated_child`.
+
+    Raises
+    ------
+    InputError
+        As `read_isolated`.
+    """
+    with _readable(source) as file, Reader(kind, file) as reader:
+        return reader.ask(source)
+
+
 class Reader:
     """A process that reads one file, or several files one after the other.
 
     Parameters
     ----------
-    kind : {"las", "e57", "pcd"}
+    kind : {"las", "e57", "pcd", "step", "ifc"}
     file : file
         A file with a name, or on Linux any file; its content is read anew for each request.
     """
@@ -92,6 +117,7 @@ class Reader:
     def __init__(self, kind: str, file: IO[bytes]) -> None:
         self.kind = kind
         self.file = file
+        self._remedy = _REMEDY_OF_DESIGN if kind in _MODEL else _REMEDY
         self._stack = ExitStack()
         self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
@@ -117,7 +143,11 @@ class Reader:
         return self._process.poll() is None
 
     def read(self, source: Input, **wanted: int | None) -> NDArray[np.void]:
-        """Let the process read the file.
+        """Let the process read the points of the file; see `read_isolated`."""
+        return self._table(source.place, self.ask(source, **wanted))
+
+    def ask(self, source: Input, **wanted: int | None) -> dict[str, Any]:
+        """Let the process read the file, and return its answer.
 
         Parameters
         ----------
@@ -133,16 +163,17 @@ class Reader:
         unpacked = (wanted.get("points") or 0) * (wanted.get("width") or 0)
         seconds = _SECONDS + (source.size + unpacked) // _BYTES_A_SECOND
         most = max(_LEAST_TABLE, _MOST_EXPANSION * source.size)
-        memory = _MEMORY + 2 * source.size + _COPIES * unpacked + _MEMORY_A_THREAD * (os.cpu_count() or 1)
+        memory = _MEMORY + _MODEL.get(self.kind, 2) * source.size + _COPIES * unpacked
+        memory += _MEMORY_A_THREAD * (os.cpu_count() or 1)
         request = {"place": source.place, "seconds": seconds, "memory": memory, "most": most, "wanted": wanted}
         request["table_a_second"] = _TABLE_A_SECOND
         self._send(request | {"target": self._target_name})
         line = self._answer(4 * seconds + most // _TABLE_A_SECOND)
         if line is None:
-            raise InputError(source.place, "takes too long to read for a file of its size", _REMEDY)
+            raise InputError(source.place, "takes too long to read for a file of its size", self._remedy)
         if not line.endswith(b"\n"):
-            raise InputError(source.place, self._cause_of_death(), _REMEDY)
-        return self._table(source.place, json.loads(line))
+            raise InputError(source.place, self._cause_of_death(), self._remedy)
+        return self._accepted(source.place, json.loads(line))
 
     def _send(self, request: object) -> None:
         assert self._process.stdin is not None
@@ -174,13 +205,16 @@ class Reader:
         cause = signal.Signals(-code).name if code < 0 and -code in set(signal.Signals) else f"exit code {code}"
         return f"broken {name}: the library that reads it crashed ({cause})"
 
-    def _table(self, place: str, answer: dict[str, Any]) -> NDArray[np.void]:
+    def _accepted(self, place: str, answer: dict[str, Any]) -> dict[str, Any]:
         if "refused" in answer:
             raise InputError(*answer["refused"])
         if "memory" in answer:
-            raise InputError(place, "asks for more memory than a file of its size can need", _REMEDY)
+            raise InputError(place, "asks for more memory than a file of its size can need", self._remedy)
         if "bug" in answer:
             raise RuntimeError(answer["bug"])
+        return answer
+
+    def _table(self, place: str, answer: dict[str, Any]) -> NDArray[np.void]:
         columns = [(str(name), kind) for name, kind in answer["columns"] if _TYPE.fullmatch(kind)]
         dtype = np.dtype(columns)
         if os.fstat(self.target.fileno()).st_size != answer["count"] * dtype.itemsize:

@@ -1,6 +1,7 @@
 """The process that decodes files by native libraries, under limits; see `isolated` for the side that starts it.
 
-It reads one request a line, fills a file with the points, and answers one line. It imports only what the format needs.
+It reads one request a line, fills a file with the points, and answers one line; a design is in the answer itself. It
+imports only what the format needs.
 """
 
 # ruff: noqa: PLC0415  (only what the format needs)
@@ -15,17 +16,22 @@ import sys
 from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from cylx.io.inputs import Input
+
 _LIBRARIES = {
     "las": ("laspy", "lazrs", "cylx.io.las"),
     "e57": ("pye57", "cylx.io.e57"),
     "pcd": ("cylx.io.pcd",),
+    "step": ("cylx.io.design_step", "OCP.STEPCAFControl", "OCP.BRepAdaptor", "OCP.XCAFDoc", "OCP.TopExp"),
+    "ifc": ("cylx.io.design_ifc", "ifcopenshell.util.placement", "ifcopenshell.util.unit"),
 }
+_DESIGNS = {"step", "ifc"}
 _NEW_USER, _NEW_NETWORK = 0x10000000, 0x40000000  # of unshare(2)
 _DIE_WITH_PARENT = 1  # of prctl(2)
 
@@ -35,7 +41,7 @@ def serve(kind: str, parent: int, request_name: str) -> None:
 
     Parameters
     ----------
-    kind : {"las", "e57", "pcd"}
+    kind : {"las", "e57", "pcd", "step", "ifc"}
         The format of all files.
     parent : int
         Id of the process that asks.
@@ -96,12 +102,16 @@ class Target:
 
 def _answer(kind: str, request: dict[str, Any], name: str) -> dict[str, Any]:
     from cylx.errors import InputError
+    from cylx.io.inputs import Input
 
     _limit(request["seconds"], request["memory"])
     target = Target(request["target"], request["most"], request["table_a_second"])
     try:
         with Path(name).open("rb") as file:
-            table = _read(kind, file, request, target)
+            source = Input(request["place"], file, os.fstat(file.fileno()).st_size, "", Path(file.name))
+            if kind in _DESIGNS:
+                return _design(kind, source)
+            table = _read(kind, source, request, target)
     except InputError as error:
         return {"refused": [error.place, error.fault, error.remedy]}
     except MemoryError:
@@ -111,10 +121,7 @@ def _answer(kind: str, request: dict[str, Any], name: str) -> dict[str, Any]:
     return {"count": len(table), "columns": [(column, table.dtype[column].str) for column in table.dtype.names or ()]}
 
 
-def _read(kind: str, file: BinaryIO, request: dict[str, Any], target: Target) -> NDArray[np.void]:
-    from cylx.io.inputs import Input
-
-    source = Input(request["place"], file, os.fstat(file.fileno()).st_size, "", Path(file.name))
+def _read(kind: str, source: Input, request: dict[str, Any], target: Target) -> NDArray[np.void]:
     if kind == "e57":
         from cylx.io.e57 import read_e57
 
@@ -126,6 +133,17 @@ def _read(kind: str, file: BinaryIO, request: dict[str, Any], target: Target) ->
     from cylx.io.las import read_las
 
     return read_las(source, allocate=target)
+
+
+def _design(kind: str, source: Input) -> dict[str, Any]:
+    """Return the units, the metres and the cylinders of a design: name, start, end and radius of each."""
+    if kind == "step":
+        from cylx.io.design_step import read_step as read
+    else:
+        from cylx.io.design_ifc import read_ifc as read
+    design = read(source)
+    cylinders = [(one.name, one.start, one.end, one.radius) for one in design.cylinders]
+    return {"units": design.units, "metres": design.metres, "cylinders": cylinders}
 
 
 def _import_libraries(kind: str) -> None:

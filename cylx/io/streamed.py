@@ -22,6 +22,7 @@ from cylx.io.names import coordinate_names, mended_names
 from cylx.io.npy import columns_of, map_npy
 from cylx.io.ply_header import TYPES, Header, read_header
 from cylx.io.ptx import ptx_columns, ptx_facts, ptx_parts, ptx_scans
+from cylx.io.withheld import withheld_rows
 from cylx.optional.extras import require
 from cylx.records import PointCloud, Source
 
@@ -62,11 +63,12 @@ class StreamedCloud:
         return self.dtype == _BARE
 
     def coordinates(self, table: NDArray[np.void]) -> NDArray[np.float64]:
-        """Return the coordinates of rows, shape (n, 3), finite or not."""
+        """Return the coordinates of rows, shape (n, 3), finite or not; NaN where the file marks them as withheld."""
         points = np.empty((len(table), 3))
         with np.errstate(all="ignore"):  # a signalling NaN is a NaN
             for axis, name in enumerate(coordinate_names(self.dtype.names or ())):
                 points[:, axis] = table[name]
+        points[withheld_rows(table, self.source.format)] = np.nan
         return points
 
     def few(self, count: int) -> PointCloud:

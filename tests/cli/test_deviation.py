@@ -2,14 +2,17 @@
 
 import json
 import re
+import sys
 from xml.etree import ElementTree
 
 import jsonschema
 import numpy as np
 import pytest
 
-from cylx.io import write_cloud
+from cylx.errors import InputError
+from cylx.io import isolated, write_cloud
 from cylx.io.design import read_design
+from cylx.io.inputs import open_input
 from tests.support.tanks import DEPTH, tank
 
 TRUTH = {"cylinders": [{"name": "tank A", "start": [0, 0, -4.0], "end": [0, 0, 4.0], "radius": 3.0}]}
@@ -118,6 +121,44 @@ def test_what_export_writes_is_read(run_cylx, tmp_path, suffix, unit):
         np.testing.assert_allclose(ends, np.sort([shape.start, shape.end], axis=0), atol=1e-6)
         assert one.radius * scale == pytest.approx(shape.radius, rel=1e-6)
         assert one.name.startswith("cylinder ") or suffix == ".csv"
+
+
+@pytest.mark.parametrize(("suffix", "library"), [("step", "OCP"), ("ifc", "ifcopenshell")])
+def test_what_native_code_reads_is_read_in_a_process_of_its_own(put, monkeypatch, suffix, library):
+    pytest.importorskip(library)
+    asked = []
+
+    def answer(source, kind):
+        asked.append((source.head(99), kind))
+        return {"units": "mm", "metres": 0.001, "cylinders": [["a", [0, 0, 0], [0, 0, 2], 0.5]]}
+
+    monkeypatch.setattr(isolated, "ask_isolated", answer)
+    design = read_design(put(f"a.{suffix}", "rubbish"))
+    assert asked == [(b"rubbish", suffix)]
+    assert (design.format, design.metres, design.cylinders[0].end) == (suffix, 0.001, (0, 0, 2))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the limits are those of Linux")
+@pytest.mark.parametrize(
+    ("code", "fault"),
+    [
+        ("ctypes.string_at(0)", "broken IFC: the library that reads it crashed (SIGSEGV)"),
+        ("while True: pass", "takes too long to read for a file of its size"),
+    ],
+)
+def test_a_design_that_crashes_or_hangs_a_library_is_one_line(put, monkeypatch, code, fault):
+    pytest.importorskip("ifcopenshell")
+    start = isolated._START.replace(
+        "from cylx.io.isolated_child",
+        f"import ctypes, cylx.io.design_ifc as d\ndef read_ifc(source):\n    {code}\nd.read_ifc = read_ifc\n"
+        "from cylx.io.isolated_child",
+    )
+    monkeypatch.setattr(isolated, "_START", start.replace("; import ctypes", "\nimport ctypes"))
+    monkeypatch.setattr(isolated, "_SECONDS", 1)
+    with open_input(put("a.ifc", "ISO-10303-21;")) as source, isolated.Reader("ifc", source.file) as reader:
+        with pytest.raises(InputError) as refused:
+            reader.ask(source)
+        assert refused.value.fault == fault
 
 
 def test_a_pipe_with_a_bore_is_one_cylinder(tmp_path):

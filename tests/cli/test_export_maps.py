@@ -7,6 +7,7 @@ import pytest
 
 from tests.io.test_crs import CODED
 
+pytestmark = pytest.mark.usefixtures("remembering")
 AT = np.array([512345.0, 5412345.0, 300.0])
 
 

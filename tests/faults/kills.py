@@ -27,6 +27,8 @@ WAYS = {
     "batch": BATCH,
     "batch --jobs 2": [*BATCH, "--jobs", "2"],
 }
+EVERY = 20
+"""Kills after which the faults so far are counted."""
 QUIET_END = {"SIGKILL": -9, "SIGTERM": -15, "SIGHUP": -1, "SIGINT": 130}
 
 
@@ -124,6 +126,8 @@ def torture(kills, pairs, seed, show=print, **scans):
             wrong = bench.kill_one(name, way, after, f"out{index}")
             counts[way, name, bool(wrong)] += 1
             faults += [f"kill {index}: {way}, {name} after {after:.2f} s: {what}" for what in wrong]
+            if (index + 1) % EVERY == 0:
+                show(f"{index + 1} kills, {len(faults)} faults")
         for index in range(pairs):
             faults += [f"pair {index}: {what}" for what in bench.pair(f"pair{index}")]
     for (way, name, bad), count in sorted(counts.items()):

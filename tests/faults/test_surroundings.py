@@ -6,12 +6,15 @@ import shutil
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cylx.cli.terminal import signals
 from cylx.cli.terminal.signals import Ended, check_heard, hear, heard
+from cylx.io import write_cloud
+from cylx.synthetic import single
 from tests.support.patience import PATIENCE
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="of Unix")
@@ -64,6 +67,27 @@ def test_it_works_or_is_one_line(shell, line, code, said):
 def test_json_is_utf8_whatever_the_terminal_is(shell, encoding):
     names = shell("cp s.xyz ü😀.xyz; $cylx config check --json ü😀.xyz", PYTHONIOENCODING=encoding, LC_ALL="C.UTF-8")
     assert json.loads(names.stdout.decode("utf-8"))["file"] == "ü😀.xyz"
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 looks into the current folder for each process")
+def test_modules_in_the_folder_of_the_scans_are_not_run(tmp_path):
+    (tmp_path / "scans").mkdir()
+    for seed in range(2):
+        write_cloud(tmp_path / "scans" / f"{seed}.ply", single(points=300, seed=seed).points)
+    for name in ("multiprocessing", "random", "json", "pickle", "numpy", "numba", "cylx"):
+        (tmp_path / f"{name}.py").write_text("open('ran', 'a').write(__name__)\n", encoding="utf-8")
+    script = tmp_path / "bin" / "cylx"  # as pip writes it: the first place that is searched is its own folder
+    script.parent.mkdir()
+    run = "import sys\nif __name__ == '__main__':\n    from cylx.__main__ import run\n    run()\n"
+    script.write_text(run, encoding="utf-8")
+    command = [sys.executable, str(script), "extract", "scans", "--jobs", "2", "-q", "--out-dir", "out"]
+    root = Path(__file__).resolve().parents[2]
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False, timeout=PATIENCE
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not (tmp_path / "ran").exists()
 
 
 def test_a_backend_of_a_notebook_is_no_obstacle():

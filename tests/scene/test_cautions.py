@@ -15,7 +15,7 @@ from cylx.synthetic import multi, single
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_data"
 PIPES = read_cloud(SAMPLES / "pipes.ply").points
 NOISE = 0.002
-SAMPLED = 20_000
+SAMPLED = 10_000
 """Points of a cloud that are looked at for steps and copies; fewer than otherwise, to be quick."""
 MAP = np.array([5e5, 5e6, 100.0])
 
@@ -149,7 +149,7 @@ def test_the_unit_and_the_order_do_not_matter(name):
     assert set(said(1000 * points[::-1])) == kinds
 
 
-@pytest.mark.parametrize("name", ["steps on all axes", "steps of z", "single precision", "all points twice"])
+@pytest.mark.parametrize("name", ["steps of z", "single precision", "all points twice"])
 def test_the_remedy_helps(name):
     few = 2 if name == "single precision" else 3  # of fewer points some are seen in spite of it
     points, (kind,) = bad_clouds(PIPES[::few])[name]

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 from contextlib import ExitStack
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 from cylx.errors import InputError
 from cylx.io.inputs import Input
 from cylx.io.isolated import Reader
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
+
+_Answer = TypeVar("_Answer")
 
 
 class KeptReaders:
@@ -27,14 +31,22 @@ class KeptReaders:
         return self.read_bytes(source.file.read(), kind, source.place, **wanted)
 
     def read_bytes(self, data: bytes, kind: str, place: str = "scan", **wanted: int | None) -> np.ndarray:
-        """Read the content of a file."""
+        """Read the points in the content of a file."""
+        return self._ask(data, kind, place, lambda reader, source: reader.read(source, **wanted).copy())
+
+    def ask_isolated(self, source: Input, kind: str) -> dict[str, Any]:
+        """Stand in for `cylx.io.isolated.ask_isolated`."""
+        source.file.seek(0)
+        return self._ask(source.file.read(), kind, source.place, lambda reader, source: reader.ask(source))
+
+    def _ask(self, data: bytes, kind: str, place: str, ask: Callable[[Reader, Input], _Answer]) -> _Answer:
         reader, inbox, _ = self._kept.get(kind) or self._start(kind)
         inbox.seek(0)
         inbox.truncate(0)
         inbox.write(data)
         inbox.flush()
         try:
-            return reader.read(Input(place, inbox, len(data), ""), **wanted).copy()
+            return ask(reader, Input(place, inbox, len(data), ""))
         except InputError as error:
             if not reader.alive or "too long" in error.fault or "crashed" in error.fault or "killed" in error.fault:
                 self.deaths += 1

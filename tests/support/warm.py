@@ -8,16 +8,19 @@ folder, environment and streams on, and ends as the process does that runs cylx 
 
 import contextlib
 import hashlib
+import importlib
 import io
 import json
 import multiprocessing.connection
 import multiprocessing.context
 import os
 import pickle
+import pkgutil
 import socket
 import subprocess
 import sys
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 _CALL = """#!{python} -ISE
@@ -33,6 +36,8 @@ if status < 0:
     os.kill(os.getpid(), -status)
 sys.exit(status)
 """
+LIBRARIES = ["scipy.optimize", "scipy.ndimage", "plyfile", "laspy", "trimesh", "ifcopenshell", "ezdxf", "jsonschema"]
+"""Of those that commands use; no Open3D, which starts threads."""
 POSSIBLE = hasattr(os, "fork") and hasattr(socket, "send_fds") and sys.platform.startswith("linux")
 
 
@@ -137,7 +142,8 @@ def remembered(extract, folder):
     def extract_once(cloud, config, *, threads=None, observer=None):
         observer = observer or SilentObserver()
         valid = b"" if cloud.valid is None else cloud.valid.tobytes()
-        about = f"{cloud.source!r} {cloud.rows} {config.model_dump_json()}".encode()
+        source = replace(cloud.source, file="")  # wherever it lies
+        about = f"{source!r} {cloud.rows} {config.model_dump_json()}".encode()
         path = folder / hashlib.sha256(b"|".join([cloud.points.tobytes(), valid, about])).hexdigest()
         if path.is_file():
             with path.open("rb") as file:
@@ -176,13 +182,26 @@ def forks():
     return Copies()
 
 
+def import_all():
+    """Import what commands import when they are called: all of cylx, and the libraries of extras that are here."""
+    import cylx
+
+    names = [module.name for module in pkgutil.walk_packages(cylx.__path__, "cylx.")]
+    for name in [name for name in names if not name.endswith("__main__")] + LIBRARIES:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
+
+
 def load(folder):
     """Import what a run imports, load what it calls, and let extractions be remembered in a folder."""
     import cylx.pipeline
     from cylx.api import warmup
 
-    warmup.extract_cylinders(warmup.PointCloud(warmup.practice_cloud()), warmup.Config(), threads=1)
-    cylx.pipeline.extract_cylinders = remembered(cylx.pipeline.extract_cylinders, folder)
+    import_all()
+    extract_once = remembered(cylx.pipeline.extract_cylinders, folder)
+    extract_once(warmup.PointCloud(warmup.practice_cloud()), warmup.Config(), threads=1)
+    # whoever warms up again finds all kernels loaded, and would only practise once more
+    cylx.pipeline.extract_cylinders = warmup.extract_cylinders = extract_once
     copies = forks()
     multiprocessing.get_context = lambda kind: copies
     assert threading.active_count() == 1, "a process with threads cannot be forked"

@@ -51,6 +51,9 @@ def own_process() -> Iterator[None]:
     listen()
     os.environ.pop("NUMBA_DISABLE_JIT", None)  # without compiling, a scan would take days
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    # processes that are started look for no modules in the current folder, which may be full of files of others; they
+    # are told where the modules are (Python 3.10 does not know this variable)
+    os.environ.setdefault("PYTHONSAFEPATH", "1")
     try:
         yield
     except KeyboardInterrupt:  # before the command, or after it

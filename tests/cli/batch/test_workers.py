@@ -10,8 +10,10 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from cylx import synthetic
+from cylx.cli import main
 from cylx.cli.batch import memory, workers
 from cylx.cli.batch.workers import Lost, Workers
 from cylx.io import temporary_beside, write_cloud
@@ -46,8 +48,13 @@ def command(folder, out, *options):
 @pytest.fixture(scope="module")
 def whole(place):
     """What comes out in one go, in one process."""
-    done = subprocess.run(command(place, "whole"), cwd=place, capture_output=True, check=False)
-    assert done.returncode == 6
+    before = Path.cwd()
+    os.chdir(place)
+    try:
+        done = CliRunner().invoke(main, ["extract", "scans", "--out-dir", str(place / "whole")], prog_name="cylx")
+    finally:
+        os.chdir(before)
+    assert done.exit_code == 6
     return contents(place / "whole")
 
 
@@ -63,7 +70,7 @@ def started(place):
                 command(place, out, "--jobs", "2"), cwd=place, stderr=subprocess.PIPE, start_new_session=True
             )
             running.append(process)
-            while process.poll() is None and len(list((place / out).glob("*.json"))) < 2:
+            while process.poll() is None and len(list((place / out).glob("[!.]*.json"))) < 2:
                 time.sleep(0.01)
             if process.poll() is None:
                 return process
