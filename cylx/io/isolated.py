@@ -79,6 +79,33 @@ def read_isolated(source: Input, kind: str, **wanted: int | None) -> NDArray[np.
         return reader.read(source, **wanted)
 
 
+def spool_isolated(source: Input, kind: str, target: IO[bytes], **wanted: int | None) -> tuple[int, np.dtype[np.void]]:
+    """Read all points as `read_isolated` does, into a file without a header.
+
+    Parameters
+    ----------
+    source : Input
+    kind : {"las", "e57", "pcd"}
+    target : binary file
+        With a name, open for reading and writing. It is written piece by piece, and need not fit into memory.
+    **wanted : int or None
+
+    Returns
+    -------
+    count : int
+        Number of rows.
+    dtype : dtype
+        Of a row.
+
+    Raises
+    ------
+    InputError
+        As `read_isolated`.
+    """
+    with _readable(source) as file, Reader(kind, file, target) as reader:
+        return reader.fill(source, **wanted)
+
+
 class Reader:
     """A process that reads one file, or several files one after the other.
 
@@ -87,18 +114,21 @@ class Reader:
     kind : {"las", "e57", "pcd"}
     file : file
         A file with a name, or on Linux any file; its content is read anew for each request.
+    target : file, optional
+        Where the points go; by default an unnamed file.
     """
 
-    def __init__(self, kind: str, file: IO[bytes]) -> None:
+    def __init__(self, kind: str, file: IO[bytes], target: IO[bytes] | None = None) -> None:
         self.kind = kind
         self.file = file
+        self._given = target
         self._stack = ExitStack()
         self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def __enter__(self) -> Reader:
         """Start the process."""
         with ExitStack() as stack:
-            self.target = stack.enter_context(_target())
+            self.target = self._given or stack.enter_context(_target())
             names, fds = zip(*(stack.enter_context(_passed_on(one)) for one in (self.file, self.target)), strict=True)
             self._process = stack.enter_context(_process([fd for fd in fds if fd is not None]))
             self._target_name = names[1]
@@ -130,6 +160,20 @@ class Reader:
         InputError
             As `read_isolated`. If the process has died or was killed, this object is of no further use.
         """
+        count, dtype = self.fill(source, **wanted)
+        if _LINUX:
+            return np.asarray(np.memmap(self.target, dtype, "c", shape=(count,)))
+        self.target.seek(0)
+        return np.fromfile(self.target, dtype, count)
+
+    def fill(self, source: Input, **wanted: int | None) -> tuple[int, np.dtype[np.void]]:
+        """Let the process read the file into the target; return the number of points, and the type of a row.
+
+        Raises
+        ------
+        InputError
+            As `read`.
+        """
         unpacked = (wanted.get("points") or 0) * (wanted.get("width") or 0)
         seconds = _SECONDS + (source.size + unpacked) // _BYTES_A_SECOND
         most = max(_LEAST_TABLE, _MOST_EXPANSION * source.size)
@@ -142,7 +186,7 @@ class Reader:
             raise InputError(source.place, "takes too long to read for a file of its size", _REMEDY)
         if not line.endswith(b"\n"):
             raise InputError(source.place, self._cause_of_death(), _REMEDY)
-        return self._table(source.place, json.loads(line))
+        return self._shape(source.place, json.loads(line))
 
     def _send(self, request: object) -> None:
         assert self._process.stdin is not None
@@ -174,7 +218,7 @@ class Reader:
         cause = signal.Signals(-code).name if code < 0 and -code in set(signal.Signals) else f"exit code {code}"
         return f"broken {name}: the library that reads it crashed ({cause})"
 
-    def _table(self, place: str, answer: dict[str, Any]) -> NDArray[np.void]:
+    def _shape(self, place: str, answer: dict[str, Any]) -> tuple[int, np.dtype[np.void]]:
         if "refused" in answer:
             raise InputError(*answer["refused"])
         if "memory" in answer:
@@ -182,13 +226,10 @@ class Reader:
         if "bug" in answer:
             raise RuntimeError(answer["bug"])
         columns = [(str(name), kind) for name, kind in answer["columns"] if _TYPE.fullmatch(kind)]
-        dtype = np.dtype(columns)
-        if os.fstat(self.target.fileno()).st_size != answer["count"] * dtype.itemsize:
+        count, dtype = int(answer["count"]), np.dtype(columns)
+        if os.fstat(self.target.fileno()).st_size != count * dtype.itemsize:
             raise RuntimeError(f"the table of {place} has not its size")
-        if _LINUX:
-            return np.asarray(np.memmap(self.target, dtype, "c", shape=(answer["count"],)))
-        self.target.seek(0)
-        return np.fromfile(self.target, dtype, answer["count"])
+        return count, dtype
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from cylx.io.las_header import LasFacts, las_header
 from cylx.io.las_mend import Spliced, mended
 from cylx.io.laz_chunks import check_chunks
 from cylx.io.names import mended_names
-from cylx.io.rows import short_of_points
+from cylx.io.row_format import short_of_points
 from cylx.optional.extras import require
 
 if TYPE_CHECKING:

@@ -12,18 +12,20 @@ from typing import TYPE_CHECKING, Any, NoReturn
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.clouds import read_cloud
+from cylx.io.clouds import check_scan
 from cylx.io.crs import las_source
 from cylx.io.formats import cloud_name, cloud_suffix, recognise
-from cylx.io.inputs import Input, check_unchanged, printable, sha256_of, stamp_of
+from cylx.io.inputs import Input, check_unchanged, open_input, printable, sha256_of, stamp_of
 from cylx.io.las import las_parts, libraries_for
 from cylx.io.las_header import kept_header, las_header
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.npy import columns_of, map_npy
+from cylx.io.packed import unpacked
 from cylx.io.ply_header import TYPES, Header, read_header
 from cylx.io.ptx import ptx_columns, ptx_facts, ptx_parts, ptx_scans
+from cylx.io.spooled import spool_cloud
 from cylx.optional.extras import require
-from cylx.records import PointCloud, Source
+from cylx.records import PointCloud, Selection, Source
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -82,8 +84,8 @@ class StreamedCloud:
 def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, units: str | None = None) -> StreamedCloud:
     """Open a cloud to be read piece by piece.
 
-    LAS, LAZ, NPY, PTX and binary PLY are read from their file. Other formats are read once as a whole, and from then on
-    from a copy on the disk.
+    LAS, LAZ, NPY, PTX and binary PLY are read from their file. Other formats and packed files are read once, and from
+    then on from a copy on the disk; see `cylx.io.spooled`.
 
     Parameters
     ----------
@@ -104,14 +106,20 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, unit
     InputError
         If it cannot be read.
     """
-    if str(path) != "-" and cloud_name(path) == str(path) and scan is None:
-        stamp, digest = stamp_of(path), sha256_of(path)
-        with _opened(path, digest) as source:
-            kind = recognise(source, cloud_suffix(path))
-            streamed = _STREAMED[kind](source, Path(path)) if kind in _STREAMED else None
+    packed = cloud_name(path) != str(path)
+    if str(path) == "-":
+        with open_input(path) as file, unpacked(file, packed=False) as source:
+            return _stated(_spooled(source, path, scan, spool), units)
+    stamp, digest = stamp_of(path), sha256_of(path)
+    with _opened(path, digest) as file, unpacked(file, packed=packed) as source:
+        kind = recognise(source, cloud_suffix(path))
+        direct = source is file and scan is None and kind in _STREAMED
+        streamed = _STREAMED[kind](source, Path(path)) if direct else None
         if streamed is not None:
             return _stated(_guarded(streamed, path, stamp, digest), units)
-    return _spooled(read_cloud(path, scan=scan, units=units), spool)
+        cloud = _spooled(source, path, scan, spool)
+    check_unchanged(path, stamp, digest)
+    return _stated(cloud, units)
 
 
 def _stated(cloud: StreamedCloud, units: str | None) -> StreamedCloud:
@@ -253,20 +261,16 @@ _STREAMED: dict[str, Callable[[Input, Path], StreamedCloud | None]] = {
 }
 
 
-def _spooled(cloud: PointCloud, spool: Path) -> StreamedCloud:
+def _spooled(source: Input, path: str | Path, scan: int | None, spool: Path) -> StreamedCloud:
     """Write the table of a cloud to the disk."""
-    table = cloud.table
-    if table is None:
-        table = np.empty(cloud.rows, _BARE)
-        for place, axis in enumerate("xyz"):
-            table[axis] = cloud.spread(cloud.points[:, place], np.nan)
-    if table.dtype.hasobject:
-        fault = "has list properties, and cannot be cut into tiles"
-        raise InputError(printable(cloud.source.file), fault, "write it without them")
-    with spool.open("wb") as file:
-        for start in range(0, len(table), ROWS):
-            file.write(table[start : start + ROWS].tobytes())
-    return StreamedCloud(cloud.source, len(table), table.dtype, _from_raw(spool, table.dtype, len(table)))
+    kind = recognise(source, cloud_suffix(path))
+    check_scan(source, kind, scan)
+    try:
+        rows, dtype, facts = spool_cloud(source, kind, scan, spool, ROWS)
+    except MemoryError:
+        raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
+    about = _source(source, Path(path), kind, selection=Selection(scan=scan), **facts)
+    return StreamedCloud(about, rows, dtype, _from_raw(spool, dtype, rows))
 
 
 def _from_raw(path: Path, dtype: np.dtype[np.void], rows: int, offset: int = 0) -> Parts:
