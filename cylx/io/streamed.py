@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from cylx.io.clouds import check_scan
 from cylx.io.crs import las_source
 from cylx.io.formats import cloud_name, cloud_suffix, recognise
 from cylx.io.inputs import Input, check_unchanged, open_input, printable, sha256_of, stamp_of
-from cylx.io.las import las_parts, libraries_for
+from cylx.io.las import las_parts, las_parts_of, libraries_for
+from cylx.io.las_blocks import blocks_hold, blocks_within, las_blocks
 from cylx.io.las_header import kept_header, las_header
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.npy import columns_of, map_npy
@@ -30,7 +31,11 @@ from cylx.records import PointCloud, Selection, Source
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from cylx.records import Crop
+
     Parts = Callable[[], Iterator[NDArray[np.void]]]
+
+Piece = TypeVar("Piece")
 
 ROWS = 1 << 18
 """Rows of a piece, at the most."""
@@ -51,12 +56,26 @@ class StreamedCloud:
         Structured: its columns.
     parts : callable
         Yields the table from its beginning, in pieces of `ROWS` rows; the last one may be shorter.
+    within : callable, optional
+        Yields what a box reaches of the table, as far as the file says where its points are: for each piece its first
+        row and its rows. Points beside the box may be among them.
     """
 
     source: Source
     rows: int
     dtype: np.dtype[np.void]
     parts: Parts
+    within: Callable[[Crop], Iterator[tuple[int, NDArray[np.void]]]] | None = None
+
+    def reached(self, crop: Crop | None) -> Iterator[tuple[int, NDArray[np.void]]]:
+        """Yield pieces of the table, each with the number of its first row, so that all points in a box are there."""
+        if crop is not None and self.within is not None:
+            yield from self.within(crop)
+            return
+        start = 0
+        for table in self.parts():
+            yield start, table
+            start += len(table)
 
     @property
     def bare(self) -> bool:
@@ -159,14 +178,19 @@ def stream_arrays(pieces: Iterable[ArrayLike], spool: Path) -> StreamedCloud:
 def _guarded(cloud: StreamedCloud, path: str | Path, stamp: tuple[int, ...] | None, digest: str) -> StreamedCloud:
     """Return a cloud that checks at the end of each reading that its file is as it was."""
 
-    def parts() -> Iterator[NDArray[np.void]]:
+    def guarded(pieces: Iterator[Piece]) -> Iterator[Piece]:
         try:
-            yield from cloud.parts()
+            yield from pieces
         except OSError as error:
             _refuse(path, error)
         check_unchanged(path, stamp, digest)
 
-    return StreamedCloud(cloud.source, cloud.rows, cloud.dtype, parts)
+    within = cloud.within
+    return replace(
+        cloud,
+        parts=lambda: guarded(cloud.parts()),
+        within=None if within is None else lambda crop: guarded(within(crop)),
+    )
 
 
 def _refuse(path: str | Path, error: OSError) -> NoReturn:
@@ -193,8 +217,14 @@ def _stream_las(source: Input, path: Path) -> StreamedCloud:
         with _opened(path, source.sha256) as file:
             yield from _of_size(las_parts(file))
 
-    first = next(las_parts(source))
-    return StreamedCloud(about, facts.points, first.dtype, parts)
+    def within(crop: Crop) -> Iterator[tuple[int, NDArray[np.void]]]:
+        with _opened(path, source.sha256) as file:
+            yield from las_parts_of(file, blocks_within(blocks, crop))
+
+    blocks, first = las_blocks(source, facts), next(las_parts(source))
+    if not blocks_hold(blocks, first):
+        blocks = ()
+    return StreamedCloud(about, facts.points, first.dtype, parts, within if blocks else None)
 
 
 def _of_size(parts: Iterator[NDArray[np.void]]) -> Iterator[NDArray[np.void]]:

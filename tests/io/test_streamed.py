@@ -60,7 +60,7 @@ def text_of(points, mark=" ", every=lambda row: row):
 
 
 TEXTS = {
-    "bare": lambda points: text_of(points),
+    "bare": text_of,
     "a count": lambda points: f"{len(points)}\n{text_of(points)}",
     "names and commas": lambda points: f"x,y,z\n{text_of(points, ',')}",
     "comments and empty lines": lambda points: f"# made\n\n{text_of(points, every=lambda row: row + '  # a point')}",
