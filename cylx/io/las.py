@@ -166,6 +166,29 @@ def las_parts_of(source: Input, blocks: Iterable[Block]) -> Iterator[tuple[int, 
         yield block.start, part
 
 
+def las_pieces(source: Input, pieces: Iterable[tuple[int, int]]) -> list[NDArray[np.void]]:
+    """Return some rows of a LAS file, or of a LAZ file whose chunks have one size.
+
+    Parameters
+    ----------
+    source : Input
+    pieces : iterable of (int, int)
+        First row of each, and the one behind its last.
+
+    Raises
+    ------
+    InputError
+        As `las_parts`.
+    """
+    facts = las_header(source)
+    with quiet_laspy(), _told_apart(source.place), _reader(source, facts) as reader:
+        found = []
+        for first, last in pieces:
+            reader.seek(first)
+            found.append(_table_of(reader.read_points(last - first), reader.header))
+        return found
+
+
 def _node(source: Input, facts: LasFacts, block: Block) -> NDArray[np.void]:
     """Return the points of a chunk of its own; lazrs cannot jump to it, as chunks of COPC differ in size."""
     import laspy  # noqa: PLC0415  an extra

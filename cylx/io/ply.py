@@ -96,6 +96,21 @@ def ply_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
     return np.dtype("<f8") if dtype.kind in "iu" and dtype.itemsize > 4 else dtype.newbyteorder("<")
 
 
+def ply_layout(header: Header) -> tuple[int, np.dtype[np.void], int] | None:
+    """Return the number and the type of the rows of the vertices, and the byte they begin at.
+
+    None if they are text or have lists, so that they are not of one size.
+    """
+    if header.text or any(element.has_lists for element in header.elements):
+        return None
+    order = ">" if header.format == "binary_big_endian" else "<"
+    properties = header.vertex.properties
+    names = mended_names([item.name for item in properties])
+    rows = np.dtype([(name, order + TYPES[item.type]) for name, item in zip(names, properties, strict=True)])
+    start = header.size + sum(element.count * element.least_size(False) for element in header.elements[:-1])
+    return header.vertex.count, rows, start
+
+
 def text_rows(header: Header) -> RowFormat:
     """Return what the rows of the vertices are in an ascii file."""
     vertex = header.vertex

@@ -19,10 +19,11 @@ from cylx.io.inputs import Input, check_unchanged, open_input, printable, sha256
 from cylx.io.las import las_parts, las_parts_of, libraries_for
 from cylx.io.las_blocks import blocks_hold, blocks_within, las_blocks
 from cylx.io.las_header import kept_header, las_header
-from cylx.io.names import coordinate_names, mended_names
+from cylx.io.names import coordinate_names
 from cylx.io.npy import columns_of, map_npy
 from cylx.io.packed import unpacked
-from cylx.io.ply_header import TYPES, Header, read_header
+from cylx.io.ply import ply_layout
+from cylx.io.ply_header import read_header
 from cylx.io.ptx import ptx_columns, ptx_facts, ptx_parts, ptx_scans
 from cylx.io.spooled import spool_cloud
 from cylx.optional.extras import require
@@ -130,7 +131,7 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, unit
         with open_input(path) as file, unpacked(file, packed=False) as source:
             return _stated(_spooled(source, path, scan, spool), units)
     stamp, digest = stamp_of(path), sha256_of(path)
-    with _opened(path, digest) as file, unpacked(file, packed=packed) as source:
+    with opened(path, digest) as file, unpacked(file, packed=packed) as source:
         kind = recognise(source, cloud_suffix(path))
         direct = source is file and scan is None and kind in _STREAMED
         streamed = _STREAMED[kind](source, Path(path)) if direct else None
@@ -199,7 +200,8 @@ def _refuse(path: str | Path, error: OSError) -> NoReturn:
 
 
 @contextmanager
-def _opened(path: str | Path, digest: str) -> Iterator[Input]:
+def opened(path: str | Path, digest: str) -> Iterator[Input]:
+    """Open a file as an input without copying it."""
     with Path(path).open("rb") as file:
         yield Input(printable(path), file, os.fstat(file.fileno()).st_size, digest, Path(path))
 
@@ -214,11 +216,11 @@ def _stream_las(source: Input, path: Path) -> StreamedCloud:
     about = _source(source, path, "las", **las_source(kept_header(source, facts), facts))
 
     def parts() -> Iterator[NDArray[np.void]]:
-        with _opened(path, source.sha256) as file:
+        with opened(path, source.sha256) as file:
             yield from _of_size(las_parts(file))
 
     def within(crop: Crop) -> Iterator[tuple[int, NDArray[np.void]]]:
-        with _opened(path, source.sha256) as file:
+        with opened(path, source.sha256) as file:
             yield from las_parts_of(file, blocks_within(blocks, crop))
 
     blocks, first = las_blocks(source, facts), next(las_parts(source))
@@ -249,34 +251,25 @@ def _stream_npy(source: Input, path: Path) -> StreamedCloud | None:
 
     def parts() -> Iterator[NDArray[np.void]]:
         for start in range(0, count, ROWS):
-            with _opened(path, source.sha256) as file:  # mapped anew: what was read before need not stay in memory
+            with opened(path, source.sha256) as file:  # mapped anew: what was read before need not stay in memory
                 yield columns_of(np.array(map_npy(file)[start : start + ROWS]), file.place)
 
     return StreamedCloud(_source(source, path, "npy"), count, dtype, parts)
 
 
 def _stream_ply(source: Input, path: Path) -> StreamedCloud | None:
-    header = read_header(source)
-    if header.text or any(element.has_lists for element in header.elements):
+    layout = ply_layout(read_header(source))
+    if layout is None:
         return None
-    count, dtype = header.vertex.count, _ply_rows(header)
-    start = header.size + sum(element.count * element.least_size(False) for element in header.elements[:-1])
+    count, dtype, start = layout
     return StreamedCloud(_source(source, path, "ply"), count, dtype, _from_raw(path, dtype, count, start))
-
-
-def _ply_rows(header: Header) -> np.dtype[np.void]:
-    """Return the type of a row of the vertices."""
-    order = ">" if header.format == "binary_big_endian" else "<"
-    properties = header.vertex.properties
-    names = mended_names([item.name for item in properties])
-    return np.dtype([(name, order + TYPES[item.type]) for name, item in zip(names, properties, strict=True)])
 
 
 def _stream_ptx(source: Input, path: Path) -> StreamedCloud:
     scans = ptx_scans(source)
 
     def parts() -> Iterator[NDArray[np.void]]:
-        with _opened(path, source.sha256) as file:
+        with opened(path, source.sha256) as file:
             yield from _of_size(ptx_parts(file, scans))
 
     about = _source(source, path, "ptx", **ptx_facts(scans))

@@ -1,9 +1,9 @@
 """How long a cloud in tiles takes on how many workers: the steps measured on one scene, and their schedule simulated.
 
 Each step of each tile is timed by itself, in processor seconds of one worker. For larger clouds, tiles are drawn from
-those measured, and the reading, cutting and writing of the one process that hands out the work grows with the points. A
-free worker takes the next task; all wait at the end of each step. Disks and networks are taken for fast enough; the last
-table says how much they have to bear.
+those measured, and the reading, cutting and writing of the one process that hands out the work grows with the points.
+A free worker takes the next task; all wait at the end of each step. Disks and networks are taken for fast enough; the
+last table says how much they have to bear.
 """
 
 import argparse

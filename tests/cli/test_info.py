@@ -47,6 +47,26 @@ def test_json_has_the_same(run_cylx, tmp_path, scene):
     assert facts["warnings"] == []
 
 
+def test_a_file_of_very_many_points_is_only_looked_at(run_cylx, tmp_path, scene):
+    many, piece = 1_000_000_000, 2000
+    table = np.lib.format.open_memmap(tmp_path / "huge.npy", "w+", np.float32, (many, 3))  # takes no place as yet
+    last = np.linspace(0, many - (1 << 16), 16).astype(int)[-1]
+    for first in (0, last):
+        table[first : first + piece] = scene.points
+        table[first + piece : first + (1 << 16)] = np.nan
+    del table
+    shown = run_cylx("info", tmp_path / "huge.npy", "--json")
+    assert shown.exit_code == 0
+    facts = json.loads(shown.stdout)
+    assert (facts["points"], facts["format"]) == (many, "npy")
+    assert "finite" not in facts
+    assert "sha256" not in facts
+    assert facts["sampled"] == 2 * piece + 14 * (1 << 16)
+    assert facts["extract_memory_bytes"] > 1e11
+    assert facts["warnings"][-1]["kind"] == "sample"
+    assert f"{facts['sampled']} of them looked at" in run_cylx("info", tmp_path / "huge.npy").stdout
+
+
 def test_the_radii_are_those_that_are_looked_for(run_cylx, tmp_path, scene):
     path = tmp_path / "can.ply"
     write_cloud(path, scene.points, properties=None)
