@@ -7,6 +7,7 @@ name that both processes map, so they are in memory once.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import queue
@@ -101,6 +102,8 @@ def spool_isolated(source: Input, kind: str, target: IO[bytes], **wanted: int | 
     ------
     InputError
         As `read_isolated`.
+    OSError
+        If the disk has no room for them.
     """
     with _readable(source) as file, Reader(kind, file, target) as reader:
         return reader.fill(source, **wanted)
@@ -179,7 +182,7 @@ class Reader:
         most = max(_LEAST_TABLE, _MOST_EXPANSION * source.size)
         memory = _MEMORY + 2 * source.size + _COPIES * unpacked + _MEMORY_A_THREAD * (os.cpu_count() or 1)
         request = {"place": source.place, "seconds": seconds, "memory": memory, "most": most, "wanted": wanted}
-        request["table_a_second"] = _TABLE_A_SECOND
+        request |= {"table_a_second": _TABLE_A_SECOND, "reserve": self._given is not None}
         self._send(request | {"target": self._target_name})
         line = self._answer(4 * seconds + most // _TABLE_A_SECOND)
         if line is None:
@@ -223,6 +226,8 @@ class Reader:
             raise InputError(*answer["refused"])
         if "memory" in answer:
             raise InputError(place, "asks for more memory than a file of its size can need", _REMEDY)
+        if "full" in answer:
+            raise OSError(errno.ENOSPC, answer["full"])
         if "bug" in answer:
             raise RuntimeError(answer["bug"])
         columns = [(str(name), kind) for name, kind in answer["columns"] if _TYPE.fullmatch(kind)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import numpy as np
 
-from cylx.errors import InputError
+from cylx.errors import InputError, OutputError
 from cylx.io.clouds import check_scan
 from cylx.io.crs import las_source
 from cylx.io.formats import cloud_name, cloud_suffix, recognise
@@ -125,6 +126,8 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, unit
     ------
     InputError
         If it cannot be read.
+    OutputError
+        If the disk has no room for the copy.
     """
     packed = cloud_name(path) != str(path)
     if str(path) == "-":
@@ -292,6 +295,11 @@ def _spooled(source: Input, path: str | Path, scan: int | None, spool: Path) -> 
         rows, dtype, facts = spool_cloud(source, kind, scan, spool, ROWS)
     except MemoryError:
         raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            _refuse(path, error)
+        fault, remedy = "cannot be written: no space left", "free some space, or choose another folder by --scratch"
+        raise OutputError(printable(spool.parent), fault, remedy) from None
     about = _source(source, Path(path), kind, selection=Selection(scan=scan), **facts)
     return StreamedCloud(about, rows, dtype, _from_raw(spool, dtype, rows))
 

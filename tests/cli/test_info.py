@@ -1,6 +1,7 @@
 """`cylx info`: what is in a file."""
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -47,13 +48,14 @@ def test_json_has_the_same(run_cylx, tmp_path, scene):
     assert facts["warnings"] == []
 
 
+@pytest.mark.skipif(os.name == "nt", reason="files with holes take their whole size there")
 def test_a_file_of_very_many_points_is_only_looked_at(run_cylx, tmp_path, scene):
     many, piece = 1_000_000_000, 2000
     table = np.lib.format.open_memmap(tmp_path / "huge.npy", "w+", np.float32, (many, 3))  # takes no place as yet
-    last = np.linspace(0, many - (1 << 16), 16).astype(int)[-1]
-    for first in (0, last):
-        table[first : first + piece] = scene.points
-        table[first + piece : first + (1 << 16)] = np.nan
+    for first in np.linspace(0, many - (1 << 16), 16).astype(int):
+        table[first : first + (1 << 16)] = np.nan
+        table[first : first + piece // 16] = scene.points[: piece // 16]
+    table[:piece] = scene.points
     del table
     shown = run_cylx("info", tmp_path / "huge.npy", "--json")
     assert shown.exit_code == 0
@@ -61,7 +63,7 @@ def test_a_file_of_very_many_points_is_only_looked_at(run_cylx, tmp_path, scene)
     assert (facts["points"], facts["format"]) == (many, "npy")
     assert "finite" not in facts
     assert "sha256" not in facts
-    assert facts["sampled"] == 2 * piece + 14 * (1 << 16)
+    assert facts["sampled"] == piece + 15 * (piece // 16)
     assert facts["extract_memory_bytes"] > 1e11
     assert facts["warnings"][-1]["kind"] == "sample"
     assert f"{facts['sampled']} of them looked at" in run_cylx("info", tmp_path / "huge.npy").stdout

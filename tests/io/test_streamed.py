@@ -1,15 +1,17 @@
 """What is read in pieces is what is read as a whole."""
 
 import contextlib
+import errno
 import gzip
 import io
+import os
 import tracemalloc
 
 import numpy as np
 import pytest
 
-from cylx.errors import InputError
-from cylx.io import isolated, read_cloud, stream_arrays, stream_cloud, write_cloud
+from cylx.errors import InputError, OutputError
+from cylx.io import isolated, isolated_child, read_cloud, stream_arrays, stream_cloud, write_cloud
 from cylx.io import streamed as module
 
 
@@ -135,6 +137,30 @@ def test_e57_goes_from_its_process_to_the_disk(tmp_path, points, monkeypatch):
     assert np.abs(one.coordinates(next(one.parts())) - points[400:700]).max() < 1e-6  # written in single precision
     monkeypatch.setattr(isolated, "_target", None)  # nothing else takes the points
     assert stream_cloud(path, tmp_path / "spool").rows == 1000
+
+
+def test_a_disk_without_room_for_the_copy_is_told_of(tmp_path, points, monkeypatch):
+    write_cloud(tmp_path / "scan.xyz", points)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(module, "spool_cloud", full)
+    with pytest.raises(OutputError, match="cannot be written: no space left; free some space"):
+        stream_cloud(tmp_path / "scan.xyz", tmp_path / "spool")
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="the disk cannot be asked for room")
+def test_the_room_for_points_is_taken_first(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / "spool").touch()
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    monkeypatch.setattr(isolated_child, "_allow_table", lambda size, rate: None)
+    with pytest.raises(isolated_child.NoRoomError, match="No space left"):
+        isolated_child.Target(str(tmp_path / "spool"), 1 << 20, 1, reserve=True)(10, np.dtype([("x", "f8")]))
+    assert len(isolated_child.Target(str(tmp_path / "spool"), 1 << 20, 1)(10, np.dtype([("x", "f8")]))) == 10
 
 
 def test_standard_input_and_a_scan_that_is_none(tmp_path, points, monkeypatch):
