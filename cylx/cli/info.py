@@ -17,7 +17,8 @@ from cylx.errors import InputError
 from cylx.wording import number
 
 if TYPE_CHECKING:
-    from cylx.geometry.arrays import FloatArray
+    from numpy.typing import NDArray
+
     from cylx.io import Glance
     from cylx.records import PointCloud, Selection, Source
     from cylx.scene.cautions import Caution
@@ -174,7 +175,7 @@ def _reference(source: Source) -> dict[str, Any]:
     return facts
 
 
-def _measured(low: FloatArray, high: FloatArray) -> dict[str, Any]:
+def _measured(low: NDArray[Any], high: NDArray[Any]) -> dict[str, Any]:
     """Return the bounds of a cloud and its size."""
     return {
         "bounds": {"min": low.tolist(), "max": high.tolist()},
