@@ -6,6 +6,7 @@ through all pieces of a row. The memory is that of all processes together, looke
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 import tempfile
@@ -143,11 +144,11 @@ def make(path, pieces, seed):
 
 
 def weight(process):
-    """Give the memory of a process and all below it that no file stands behind, MB."""
+    """Give the proportional share of the memory of a process and all below it, mapped files included, MB."""
     total = 0.0
     try:
-        status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
-        total = int(status.split("RssAnon:")[1].split()[0]) / 1e3
+        about = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
+        total = int(about.split("\nPss:")[1].split()[0]) / 1e3
         children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii").split()
     except (OSError, IndexError):
         return total
@@ -155,29 +156,35 @@ def weight(process):
 
 
 def watched(command):
-    """Run a command; give its exit code, seconds, and peak memory."""
-    started, peak = time.perf_counter(), 0.0
+    """Run a command; give its exit code, seconds, seconds of processors, and peak memory."""
+    started, before, peak = time.perf_counter(), used(), 0.0
     with subprocess.Popen([str(word) for word in command], stderr=subprocess.DEVNULL) as child:
         while child.poll() is None:
             peak = max(peak, weight(child.pid))
             time.sleep(0.1)
-    return child.returncode, time.perf_counter() - started, peak
+    return child.returncode, time.perf_counter() - started, used() - before, peak
+
+
+def used():
+    """Give the seconds of processors that all processes begun here have taken, once they have ended."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def measure(scene, folder, extra, bars, most):
     """Print the row of a run; give its result."""
     output = Path(folder) / f"{scene.stem}.json"
     command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", *extra]
-    code, seconds, peak = watched(command)
+    code, seconds, busy, peak = watched(command)
     if code:
-        print_row(scene.stem, " ".join(extra) or "whole", *["-"] * 6)
+        print_row(scene.stem, " ".join(extra) or "whole", *["-"] * 7)
         return None
     result, truth = (json.loads(path.read_text(encoding="utf-8")) for path in (output, truth_of(scene)))
     told, tiles = evaluate(truth, result), result.get("tiles", {"count": 1, "joined": 0})
     verdict = bars.at_most(peak, most) if extra else ""
     name = " ".join(extra) or "whole"
-    row = (f"{told.f1:.4f}", f"{tiles['count']}", f"{tiles['joined']}", f"{seconds:.0f}", f"{peak:.0f}", verdict)
-    print_row(scene.stem, name, *row)
+    counts = f"{told.f1:.4f}", f"{tiles['count']}", f"{tiles['joined']}"
+    print_row(scene.stem, name, *counts, f"{seconds:.0f}", f"{busy:.0f}", f"{peak:.0f}", verdict)
     sys.stdout.flush()
     return output
 
@@ -196,7 +203,7 @@ def main():
         if not (scene.is_file() and truth_of(scene).is_file()):
             make(scene, int("".join(filter(str.isdigit, scene.stem))), 0)
     bars, most = Bars(), float(a.memory.removesuffix("GB")) * 1000
-    print_header("scene", "run", "F1", "tiles", "joined", "seconds", "peak MB", "bar")
+    print_header("scene", "run", "F1", "tiles", "joined", "seconds", "of processors", "peak MB", "bar")
     with tempfile.TemporaryDirectory() as folder:
         warm_up(folder)
         for scene in a.scenes:
