@@ -148,4 +148,4 @@ def test_every_warning_is_told_of():
     page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
     table = page.partition("## A first look\n")[2].partition("\n## ")[0]
     assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) == kinds
-    assert len(kinds) == 13
+    assert len(kinds) == 14
