@@ -17,8 +17,14 @@ from cylx.errors import InputError
 from cylx.wording import number
 
 if TYPE_CHECKING:
-    from cylx.records import PointCloud, Selection
+    from numpy.typing import NDArray
+
+    from cylx.io import Glance
+    from cylx.records import PointCloud, Selection, Source
     from cylx.scene.cautions import Caution
+
+LARGE = 50_000_000
+"""Of more points only a sample is read."""
 
 
 @click.command(cls=ExampleCommand, examples=["cylx info scan.ply", "cylx info scan.ply --json | jq .scene.spacing"])
@@ -34,14 +40,21 @@ def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
 
     SCAN is a PLY, PCD, XYZ, LAS, LAZ, E57, PTX or NPY file, or - for standard input. Spacing and noise are measured as
     'cylx extract' does, in the unit of the scan; the range of radii and the memory needed follow from them. If only
-    some points are used, all values are for these points. Standard error shows one line for each likely problem.
+    some points are used, all values are for these points. Standard error shows one line for each likely problem. Of a
+    LAS, LAZ, NPY or binary PLY of more than 50 million points, only the header and a sample are read.
     """
-    from cylx.io import read_cloud
+    from cylx.io import expected_points, glance_at, read_cloud
     from cylx.scene import select
 
-    whole = read_cloud(scan, scan=selection.scan)
-    cloud = select(whole, selection)
-    facts = describe_cloud(whole, cloud)
+    narrowed = selection.narrows or selection.scan is not None
+    seen = None if narrowed or expected_points(scan) <= LARGE else glance_at(scan)
+    if seen is not None:
+        whole = cloud = seen.sample
+        facts = describe_glance(seen)
+    else:
+        whole = read_cloud(scan, scan=selection.scan)
+        cloud = select(whole, selection)
+        facts = describe_cloud(whole, cloud)
     try:
         prospects, found = look_ahead(whole, cloud, seed)
         facts.update(prospects)
@@ -50,6 +63,8 @@ def info(*, scan: str, seed: int, selection: Selection, as_json: bool) -> None:
 
         found = [Caution("unusable", failure.fault, "no cylinders can be found in it")]
     found += _scarce_memory(facts["extract_memory_bytes"])
+    if seen is not None:
+        found.append(_sampled(seen))
     facts["warnings"] = [asdict(caution) for caution in found]
     for caution in found:
         tell(f"warning: {cloud.source.file}: {caution}")
@@ -120,19 +135,57 @@ def describe_cloud(whole: PointCloud, cloud: PointCloud) -> dict[str, Any]:
         "finite": len(whole.points),
         "fields": fields,
     }
-    if cloud.source.units is not None:
-        facts["units"] = cloud.source.units
-    if cloud.source.crs is not None:
-        facts["crs"] = {key: value for key, value in asdict(cloud.source.crs).items() if value is not None}
+    facts |= _reference(cloud.source)
     if cloud is not whole:
         facts["selected"] = len(cloud.points)
     facts["extract_memory_bytes"] = memory_for(cloud.rows if cloud is whole else len(cloud.points))
     if len(cloud.points):
-        low, high = cloud.points.min(axis=0), cloud.points.max(axis=0)
-        facts["bounds"] = {"min": low.tolist(), "max": high.tolist()}
-        facts["size"] = (high - low).tolist()
-        facts["extent"] = float(((high - low) ** 2).sum() ** 0.5)
+        facts |= _measured(cloud.points.min(axis=0), cloud.points.max(axis=0))
     return facts
+
+
+def describe_glance(seen: Glance) -> dict[str, Any]:
+    """Return the facts about a file of which only a sample was read as a JSON object."""
+    source, points = seen.sample.source, seen.sample.points
+    low, high = (points.min(axis=0), points.max(axis=0)) if seen.bounds is None else seen.bounds
+    facts: dict[str, Any] = {
+        "file": source.file,
+        "format": source.format,
+        "points": seen.rows,
+        "sampled": len(points),
+        "fields": [{"name": name, "type": str(seen.dtype[name])} for name in seen.dtype.names or ()],
+        **_reference(source),
+        "extract_memory_bytes": memory_for(seen.rows),
+    }
+    return facts | _measured(low, high)
+
+
+def _sampled(seen: Glance) -> Caution:
+    from cylx.scene.cautions import Caution
+
+    fault = f"only {len(seen.sample.points)} of {seen.rows} points were looked at"
+    return Caution("sample", fault, "if the rows are in no order, the spacing is smaller than said here")
+
+
+def _reference(source: Source) -> dict[str, Any]:
+    """Return the unit and the CRS, as far as they are known."""
+    facts: dict[str, Any] = {} if source.units is None else {"units": source.units}
+    if source.crs is not None:
+        facts["crs"] = {key: value for key, value in asdict(source.crs).items() if value is not None}
+    return facts
+
+
+def _measured(low: NDArray[Any], high: NDArray[Any]) -> dict[str, Any]:
+    """Return the bounds of a cloud and its size."""
+    return {
+        "bounds": {"min": low.tolist(), "max": high.tolist()},
+        "size": (high - low).tolist(),
+        "extent": float(((high - low) ** 2).sum() ** 0.5),
+    }
+
+
+def _looked_at(facts: dict[str, Any]) -> str:
+    return f"{facts['sampled']} of them looked at" if "sampled" in facts else f"{facts['finite']} of them finite"
 
 
 def as_text(facts: dict[str, Any]) -> str:
@@ -140,7 +193,7 @@ def as_text(facts: dict[str, Any]) -> str:
     lines = {
         "file": facts["file"],
         "format": facts["format"],
-        "points": f"{facts['points']}, {facts['finite']} of them finite",
+        "points": f"{facts['points']}, {_looked_at(facts)}",
         **({"selected": str(facts["selected"])} if "selected" in facts else {}),
         "fields": ", ".join(f"{field['name']} ({field['type']})" for field in facts["fields"]),
     }

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from cylx.io.formats import LAS_SUFFIXES as LAS_SUFFIXES
     from cylx.io.formats import cloud_name as cloud_name
     from cylx.io.formats import cloud_suffix as cloud_suffix
+    from cylx.io.glance import Glance as Glance
+    from cylx.io.glance import glance_at as glance_at
     from cylx.io.inputs import printable as printable
     from cylx.io.inputs import read_json as read_json
     from cylx.io.inputs import sha256_of as sha256_of
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from cylx.io.streamed import stream_cloud as stream_cloud
 
 _HOMES = {
+    "Glance": "cylx.io.glance",
     "LAS_SUFFIXES": "cylx.io.formats",
     "Scratch": "cylx.io.scratch",
     "StreamedCloud": "cylx.io.streamed",
@@ -47,6 +50,7 @@ _HOMES = {
     "cloud_suffix": "cylx.io.formats",
     "cloud_suffixes": "cylx.io.clouds",
     "expected_points": "cylx.io.sizes",
+    "glance_at": "cylx.io.glance",
     "las_obstacle": "cylx.io.annotated",
     "open_scratch": "cylx.io.scratch",
     "printable": "cylx.io.inputs",

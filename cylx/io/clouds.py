@@ -65,16 +65,26 @@ def read_cloud(
     packed = cloud_name(path) != str(path)
     with open_input(path) as file, unpacked(file, packed=packed) as source:
         kind = format or recognise(source, cloud_suffix(path))
-        if scan is not None and kind not in ("e57", "ptx"):
-            raise InputError(source.place, "is neither E57 nor PTX, so no scan can be chosen", "leave --scan out")
+        check_scan(source, kind, scan)
         try:
-            table, facts = _read(source, kind, scan)
+            table, facts = read_table(source, kind, scan)
         except MemoryError:
             raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
         if units is not None:
             facts["units"] = units
         origin = Source(_file_name(path), kind, source.sha256, Selection(scan=scan), **facts)
         return _cloud(table, source.place, origin)
+
+
+def check_scan(source: Input, kind: str, scan: int | None) -> None:
+    """Refuse the number of a scan for a format that has none.
+
+    Raises
+    ------
+    InputError
+    """
+    if scan is not None and kind not in ("e57", "ptx"):
+        raise InputError(source.place, "is neither E57 nor PTX, so no scan can be chosen", "leave --scan out")
 
 
 def recorded_name(path: str | Path) -> str:
@@ -135,8 +145,22 @@ def _file_name(path: str | Path) -> str:
     return str(path).encode("utf-8", "replace").decode()
 
 
-def _read(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], dict[str, Any]]:
-    """Read the table of a file, and what else its source says; rarely needed readers are imported late."""
+def read_table(source: Input, kind: str, scan: int | None) -> tuple[NDArray[np.void], dict[str, Any]]:
+    """Read the table of a file, and what else its source says; rarely needed readers are imported late.
+
+    Parameters
+    ----------
+    source : Input
+    kind : str
+        Its format, one of `FORMATS`.
+    scan : int, optional
+        Number of the scan of an E57 or PTX file to read; by default all.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, is damaged, lacks the scan, or needs a library that is not installed.
+    """
     if kind == "las":
         from cylx.io.crs import las_source  # noqa: PLC0415  for this alone
         from cylx.io.isolated import read_isolated  # noqa: PLC0415  starts processes

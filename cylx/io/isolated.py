@@ -7,6 +7,7 @@ name that both processes map, so they are in memory once.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import queue
@@ -104,6 +105,35 @@ def ask_isolated(source: Input, kind: str) -> dict[str, Any]:
         return reader.ask(source)
 
 
+def spool_isolated(source: Input, kind: str, target: IO[bytes], **wanted: int | None) -> tuple[int, np.dtype[np.void]]:
+    """Read all points as `read_isolated` does, into a file without a header.
+
+    Parameters
+    ----------
+    source : Input
+    kind : {"las", "e57", "pcd"}
+    target : binary file
+        With a name, open for reading and writing. It is written piece by piece, and need not fit into memory.
+    **wanted : int or None
+
+    Returns
+    -------
+    count : int
+        Number of rows.
+    dtype : dtype
+        Of a row.
+
+    Raises
+    ------
+    InputError
+        As `read_isolated`.
+    OSError
+        If the disk has no room for them.
+    """
+    with _readable(source) as file, Reader(kind, file, target) as reader:
+        return reader.fill(source, **wanted)
+
+
 class Reader:
     """A process that reads one file, or several files one after the other.
 
@@ -112,19 +142,22 @@ class Reader:
     kind : {"las", "e57", "pcd", "step", "ifc"}
     file : file
         A file with a name, or on Linux any file; its content is read anew for each request.
+    target : file, optional
+        Where the points go; by default an unnamed file.
     """
 
-    def __init__(self, kind: str, file: IO[bytes]) -> None:
+    def __init__(self, kind: str, file: IO[bytes], target: IO[bytes] | None = None) -> None:
         self.kind = kind
         self.file = file
         self._remedy = _REMEDY_OF_DESIGN if kind in _MODEL else _REMEDY
+        self._given = target
         self._stack = ExitStack()
         self._answers: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
     def __enter__(self) -> Reader:
         """Start the process."""
         with ExitStack() as stack:
-            self.target = stack.enter_context(_target())
+            self.target = self._given or stack.enter_context(_target())
             names, fds = zip(*(stack.enter_context(_passed_on(one)) for one in (self.file, self.target)), strict=True)
             self._process = stack.enter_context(_process([fd for fd in fds if fd is not None]))
             self._target_name = names[1]
@@ -144,7 +177,21 @@ class Reader:
 
     def read(self, source: Input, **wanted: int | None) -> NDArray[np.void]:
         """Let the process read the points of the file; see `read_isolated`."""
-        return self._table(source.place, self.ask(source, **wanted))
+        count, dtype = self.fill(source, **wanted)
+        if _LINUX:
+            return np.asarray(np.memmap(self.target, dtype, "c", shape=(count,)))
+        self.target.seek(0)
+        return np.fromfile(self.target, dtype, count)
+
+    def fill(self, source: Input, **wanted: int | None) -> tuple[int, np.dtype[np.void]]:
+        """Let the process read the file into the target; return the number of points, and the type of a row.
+
+        Raises
+        ------
+        InputError
+            As `ask`.
+        """
+        return self._shape(source.place, self.ask(source, **wanted))
 
     def ask(self, source: Input, **wanted: int | None) -> dict[str, Any]:
         """Let the process read the file, and return its answer.
@@ -166,7 +213,7 @@ class Reader:
         memory = _MEMORY + _MODEL.get(self.kind, 2) * source.size + _COPIES * unpacked
         memory += _MEMORY_A_THREAD * (os.cpu_count() or 1)
         request = {"place": source.place, "seconds": seconds, "memory": memory, "most": most, "wanted": wanted}
-        request["table_a_second"] = _TABLE_A_SECOND
+        request |= {"table_a_second": _TABLE_A_SECOND, "reserve": self._given is not None}
         self._send(request | {"target": self._target_name})
         line = self._answer(4 * seconds + most // _TABLE_A_SECOND)
         if line is None:
@@ -210,19 +257,18 @@ class Reader:
             raise InputError(*answer["refused"])
         if "memory" in answer:
             raise InputError(place, "asks for more memory than a file of its size can need", self._remedy)
+        if "full" in answer:
+            raise OSError(errno.ENOSPC, answer["full"])
         if "bug" in answer:
             raise RuntimeError(answer["bug"])
         return answer
 
-    def _table(self, place: str, answer: dict[str, Any]) -> NDArray[np.void]:
+    def _shape(self, place: str, answer: dict[str, Any]) -> tuple[int, np.dtype[np.void]]:
         columns = [(str(name), kind) for name, kind in answer["columns"] if _TYPE.fullmatch(kind)]
-        dtype = np.dtype(columns)
-        if os.fstat(self.target.fileno()).st_size != answer["count"] * dtype.itemsize:
+        count, dtype = int(answer["count"]), np.dtype(columns)
+        if os.fstat(self.target.fileno()).st_size != count * dtype.itemsize:
             raise RuntimeError(f"the table of {place} has not its size")
-        if _LINUX:
-            return np.asarray(np.memmap(self.target, dtype, "c", shape=(answer["count"],)))
-        self.target.seek(0)
-        return np.fromfile(self.target, dtype, answer["count"])
+        return count, dtype
 
 
 @contextmanager

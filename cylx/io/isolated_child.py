@@ -59,6 +59,10 @@ def serve(kind: str, parent: int, request_name: str) -> None:
         answers.flush()
 
 
+class NoRoomError(BaseException):
+    """The disk has no room for the points; not an `Exception`, as readers take these for faults of the file."""
+
+
 class Target:
     """The file that receives the points, mapped into memory.
 
@@ -70,12 +74,15 @@ class Target:
         Largest size in bytes.
     rate : int
         Bytes for which a second is added to the time allowed.
+    reserve : bool
+        Whether the room on the disk is taken first: a disk that is full later would kill the process.
     """
 
-    def __init__(self, name: str, most: int, rate: int) -> None:
+    def __init__(self, name: str, most: int, rate: int, *, reserve: bool = False) -> None:
         self.name = name
         self.rate = rate
         self.most = most
+        self.reserve = reserve
         self.table: NDArray[np.void] | None = None
 
     def __call__(self, count: int, dtype: np.dtype[np.void]) -> NDArray[np.void]:
@@ -85,6 +92,8 @@ class Target:
         ------
         MemoryError
             If it would be larger than allowed.
+        NoRoomError
+            If the disk has no room for it.
         """
         import numpy as np
 
@@ -95,6 +104,11 @@ class Target:
         with Path(self.name).open("r+b") as file:
             file.truncate(0)
             file.truncate(size)
+            if self.reserve and hasattr(os, "posix_fallocate"):
+                try:
+                    os.posix_fallocate(file.fileno(), 0, size)
+                except OSError as error:
+                    raise NoRoomError(error.strerror) from None
             mapped = mmap.mmap(file.fileno(), size)
         self.table = np.frombuffer(mapped, dtype, count)
         return self.table
@@ -105,7 +119,7 @@ def _answer(kind: str, request: dict[str, Any], name: str) -> dict[str, Any]:
     from cylx.io.inputs import Input
 
     _limit(request["seconds"], request["memory"])
-    target = Target(request["target"], request["most"], request["table_a_second"])
+    target = Target(request["target"], request["most"], request["table_a_second"], reserve=request["reserve"])
     try:
         with Path(name).open("rb") as file:
             source = Input(request["place"], file, os.fstat(file.fileno()).st_size, "", Path(file.name))
@@ -116,6 +130,8 @@ def _answer(kind: str, request: dict[str, Any], name: str) -> dict[str, Any]:
         return {"refused": [error.place, error.fault, error.remedy]}
     except MemoryError:
         return {"memory": True}
+    except NoRoomError as error:
+        return {"full": str(error)}
     except BaseException as error:  # noqa: BLE001  a panic of Rust, too
         return {"bug": f"{type(error).__name__}: {error}"}
     return {"count": len(table), "columns": [(column, table.dtype[column].str) for column in table.dtype.names or ()]}

@@ -15,20 +15,22 @@ from cylx.io.las_header import LasFacts, las_header
 from cylx.io.las_mend import Spliced, mended
 from cylx.io.laz_chunks import check_chunks
 from cylx.io.names import mended_names
-from cylx.io.rows import short_of_points
+from cylx.io.row_format import short_of_points
 from cylx.optional.extras import require
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from numpy.typing import NDArray
 
     from cylx.io.inputs import Input
+    from cylx.io.las_blocks import Block
 
     Allocate = Callable[[int, np.dtype[np.void]], NDArray[np.void]]
 
 _CHUNK = 1 << 19  # points read at a time, at the most, ...
 _BUFFER = 1 << 25  # ... and bytes
+_MOST_EXPANSION = 1 << 12  # equal points take 1/2800 of their size
 _REMEDY = "get a complete copy of the file"
 
 
@@ -131,6 +133,81 @@ def las_parts(source: Input) -> Iterator[NDArray[np.void]]:
         raise short_of_points(source.place, facts.points, done)
 
 
+def las_parts_of(source: Input, blocks: Iterable[Block]) -> Iterator[tuple[int, NDArray[np.void]]]:
+    """Yield some blocks of the table of `read_las` piece by piece; of a COPC file nothing else is read.
+
+    Parameters
+    ----------
+    source : Input
+    blocks : iterable of Block
+        From `las_blocks`.
+
+    Yields
+    ------
+    int
+        The first row of a piece.
+    ndarray, structured
+
+    Raises
+    ------
+    InputError
+        As `las_parts`.
+    """
+    facts = las_header(source)
+    for block in blocks:
+        if block.size == 0:
+            start = block.start
+            for part in las_parts(source):
+                yield start, part
+                start += len(part)
+            continue
+        with quiet_laspy(), _told_apart(source.place):
+            part = _node(source, facts, block)
+        yield block.start, part
+
+
+def las_pieces(source: Input, pieces: Iterable[tuple[int, int]]) -> list[NDArray[np.void]]:
+    """Return some rows of a LAS file, or of a LAZ file whose chunks have one size.
+
+    Parameters
+    ----------
+    source : Input
+    pieces : iterable of (int, int)
+        First row of each, and the one behind its last.
+
+    Raises
+    ------
+    InputError
+        As `las_parts`.
+    """
+    facts = las_header(source)
+    with quiet_laspy(), _told_apart(source.place), _reader(source, facts) as reader:
+        found = []
+        for first, last in pieces:
+            reader.seek(first)
+            found.append(_table_of(reader.read_points(last - first), reader.header))
+        return found
+
+
+def _node(source: Input, facts: LasFacts, block: Block) -> NDArray[np.void]:
+    """Return the points of a chunk of its own; lazrs cannot jump to it, as chunks of COPC differ in size."""
+    import laspy  # noqa: PLC0415  an extra
+    import lazrs  # noqa: PLC0415  an extra
+
+    header = laspy.LasHeader.read_from(_mended_file(source, facts))
+    if block.rows * header.point_format.size > max(_MOST_EXPANSION * block.size, _BUFFER):
+        raise InputError(source.place, "a compressed chunk is damaged", _REMEDY)
+    record = header.vlrs[header.vlrs.index("LasZipVlr")].record_data
+    out = np.zeros(block.rows * header.point_format.size, np.uint8)
+    source.file.seek(block.place)
+    data = np.frombuffer(source.file.read(block.size), np.uint8)
+    vlr = np.frombuffer(record, np.uint8)
+    lazrs.decompress_points_with_chunk_table(data, vlr, out, [(block.rows, block.size)])
+    points = out.view(header.point_format.dtype())
+    chunk = laspy.ScaleAwarePointRecord(points, header.point_format, header.scales, header.offsets)
+    return _table_of(chunk, header)
+
+
 def libraries_for(facts: LasFacts) -> tuple[str, ...]:
     """Return the libraries that a file needs."""
     return ("laspy", "lazrs") if facts.compressed else ("laspy",)
@@ -138,6 +215,19 @@ def libraries_for(facts: LasFacts) -> tuple[str, ...]:
 
 def _parts(source: Input, facts: LasFacts) -> Iterator[NDArray[np.void]]:
     """Yield the points in pieces."""
+    with _reader(source, facts) as reader:
+        for chunk in reader.chunk_iterator(_piece(reader.header)):
+            yield _table_of(chunk, reader.header)
+
+
+def _piece(header: Any) -> int:  # noqa: ANN401  (of laspy)
+    """Return how many points are read at a time."""
+    return int(min(_CHUNK, max(_BUFFER // header.point_format.size, 1)))
+
+
+@contextmanager
+def _reader(source: Input, facts: LasFacts) -> Iterator[Any]:
+    """Open a file by laspy, after its chunks have been checked."""
     import laspy  # noqa: PLC0415  an extra
 
     file = _mended_file(source, facts)
@@ -147,16 +237,19 @@ def _parts(source: Input, facts: LasFacts) -> Iterator[NDArray[np.void]]:
         backend = laspy.LazBackend.LazrsParallel if parallel else laspy.LazBackend.Lazrs
         file.seek(0)
     with laspy.open(file, closefd=False, read_evlrs=False, laz_backend=backend) as reader:
-        header = reader.header
-        columns = las_dimensions(header.point_format)
-        types = [*((axis, np.dtype("f8")) for axis in "xyz"), *((one.name, one.type) for one in columns)]
-        for chunk in reader.chunk_iterator(min(_CHUNK, max(_BUFFER // header.point_format.size, 1))):
-            part = np.empty(len(chunk), np.dtype(types))
-            for axis, scale, offset in zip("xyz", header.scales, header.offsets, strict=True):
-                part[axis] = chunk[axis.upper()] * np.float64(scale) + np.float64(offset)
-            for one in columns:
-                part[one.name] = one.of(np.asarray(chunk[one.dimension]))
-            yield part
+        yield reader
+
+
+def _table_of(chunk: Any, header: Any) -> NDArray[np.void]:  # noqa: ANN401  (of laspy)
+    """Return the table of some points."""
+    columns = las_dimensions(header.point_format)
+    types = [*((axis, np.dtype("f8")) for axis in "xyz"), *((one.name, one.type) for one in columns)]
+    part = np.empty(len(chunk), np.dtype(types))
+    for axis, scale, offset in zip("xyz", header.scales, header.offsets, strict=True):
+        part[axis] = chunk[axis.upper()] * np.float64(scale) + np.float64(offset)
+    for one in columns:
+        part[one.name] = one.of(np.asarray(chunk[one.dimension]))
+    return part
 
 
 def _mended_file(source: Input, facts: LasFacts) -> BinaryIO:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cylx.errors import InputError
-from cylx.io.rows import short_of_points
+from cylx.io.row_format import short_of_points
 
 if TYPE_CHECKING:
     from cylx.io.inputs import Input

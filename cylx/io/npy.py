@@ -17,7 +17,7 @@ from cylx.errors import InputError
 from cylx.io.inputs import Input, excerpt
 from cylx.io.names import mended_names, missing_coordinates
 from cylx.io.packed import copy_unpacked
-from cylx.io.rows import short_of_points
+from cylx.io.row_format import short_of_points
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

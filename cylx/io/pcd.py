@@ -16,7 +16,8 @@ import numpy as np
 from cylx.errors import InputError
 from cylx.io.inputs import Input, excerpt
 from cylx.io.names import coordinate_names, mended_names, missing_coordinates
-from cylx.io.rows import RowFormat, read_rows, short_of_points
+from cylx.io.row_format import RowFormat, short_of_points
+from cylx.io.rows import read_rows
 from cylx.optional.extras import is_found
 from cylx.optional.open3d import unpack_columns
 

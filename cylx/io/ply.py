@@ -12,7 +12,8 @@ import numpy as np
 from cylx.errors import InputError
 from cylx.io.names import coordinate_names, mended_names
 from cylx.io.ply_header import TYPES, Header, read_header
-from cylx.io.rows import RowFormat, read_rows
+from cylx.io.row_format import RowFormat
+from cylx.io.rows import read_rows
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -44,7 +45,7 @@ def read_ply(source: Input) -> NDArray[np.void]:
     """
     header = read_header(source)
     if header.text and not header.vertex.has_lists:
-        return _read_text(header, source)
+        return read_rows(source, text_rows(header))
     return _read_with_plyfile(header, source)
 
 
@@ -95,7 +96,23 @@ def ply_type(dtype: np.dtype[Any]) -> np.dtype[Any]:
     return np.dtype("<f8") if dtype.kind in "iu" and dtype.itemsize > 4 else dtype.newbyteorder("<")
 
 
-def _read_text(header: Header, source: Input) -> NDArray[np.void]:
+def ply_layout(header: Header) -> tuple[int, np.dtype[np.void], int] | None:
+    """Return the number and the type of the rows of the vertices, and the byte they begin at.
+
+    None if they are text or have lists, so that they are not of one size.
+    """
+    if header.text or any(element.has_lists for element in header.elements):
+        return None
+    order = ">" if header.format == "binary_big_endian" else "<"
+    properties = header.vertex.properties
+    names = mended_names([item.name for item in properties])
+    rows = np.dtype([(name, order + TYPES[item.type]) for name, item in zip(names, properties, strict=True)])
+    start = header.size + sum(element.count * element.least_size(False) for element in header.elements[:-1])
+    return header.vertex.count, rows, start
+
+
+def text_rows(header: Header) -> RowFormat:
+    """Return what the rows of the vertices are in an ascii file."""
     vertex = header.vertex
     names = [item.name for item in vertex.properties]
     exact = coordinate_names(names)
@@ -104,7 +121,7 @@ def _read_text(header: Header, source: Input) -> NDArray[np.void]:
     ]
     skip = sum(element.count for element in header.elements[:-1])
     dtype = np.dtype(list(zip(mended_names(names), types, strict=True)))
-    return read_rows(source, RowFormat(dtype, header.size, header.lines + 1, skip, vertex.count))
+    return RowFormat(dtype, header.size, header.lines + 1, skip, vertex.count)
 
 
 def _read_with_plyfile(header: Header, source: Input) -> NDArray[np.void]:

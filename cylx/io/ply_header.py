@@ -11,7 +11,7 @@ import numpy as np
 from cylx.errors import InputError
 from cylx.io.inputs import Input, excerpt
 from cylx.io.names import coordinate_names, mended_names, missing_coordinates
-from cylx.io.rows import short_of_points
+from cylx.io.row_format import short_of_points
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

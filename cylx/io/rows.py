@@ -5,92 +5,23 @@ from __future__ import annotations
 import io
 import warnings
 from contextlib import contextmanager
-from dataclasses import dataclass
 from itertools import islice
 from operator import itemgetter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cylx.errors import InputError
-from cylx.io.cells import (
-    COMMENTS,
-    DECIMAL_COMMA,
-    SHARP,
-    all_cells,
-    check_number,
-    is_count,
-    is_missing,
-    plain_number,
-    split_row,
-    uncommented,
-)
+from cylx.io.cells import COMMENTS, SHARP
 from cylx.io.inputs import Input
+from cylx.io.row_checks import checked_lines
+from cylx.io.row_format import LONGEST_LINE, RowFormat, short_of_points, wrong_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from numpy.typing import NDArray
 
-LONGEST_LINE = 1 << 20
-"""Letters of a line: more than any table of points has."""
 _BLOCK = 1 << 20
-_END = "\x1a"
-"""What ends a text of DOS."""
-
-
-@dataclass(frozen=True, slots=True)
-class RowFormat:
-    """The format and position of the rows.
-
-    Parameters
-    ----------
-    dtype : dtype
-        Structured: one scalar field per column.
-    offset : int
-        Byte at which the text begins.
-    line : int
-        Number of that line in the file, from 1.
-    skip : int
-        Lines to skip from there.
-    count : int or None
-        Number of rows to read; None for all.
-    delimiter : str or None
-        Separator of the columns; None for white space.
-    commented : bool
-        Whether `#` and `//` begin a comment.
-    encoding : str
-        Of the text.
-    kept : tuple of int, optional
-        Which columns are read, ascending, if not all of them.
-    columns : int, optional
-        Number of columns of the text, if it is not that of the fields.
-    promised : int, optional
-        Number of rows that a line above the first row promised. Lines of a count between the rows add to it.
-    header : str
-        The line of names, which may come again.
-    loose : bool
-        Whether an empty value is missing (NaN), and a comma may be the decimal mark.
-    """
-
-    dtype: np.dtype[np.void]
-    offset: int = 0
-    line: int = 1
-    skip: int = 0
-    count: int | None = None
-    delimiter: str | None = None
-    commented: bool = False
-    encoding: str = "utf-8-sig"
-    kept: tuple[int, ...] | None = None
-    columns: int | None = None
-    promised: int | None = None
-    header: str = ""
-    loose: bool = False
-
-    @property
-    def width(self) -> int:
-        """Number of columns of the text."""
-        return len(self.dtype.names or ()) if self.columns is None else self.columns
 
 
 def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
@@ -116,18 +47,10 @@ def read_rows(source: Input, rows: RowFormat) -> NDArray[np.void]:
     if table is None:
         # The fast reader failed. The slower one finds the line that is wrong; if none is, it returns the rows.
         with text_lines(source, rows.offset, rows.encoding) as lines:
-            table = _load(_checked(lines, rows, source.place), rows, None, most)
+            table = load_lines(checked_lines(lines, rows, source.place), rows, None, most)
     if rows.count is not None and len(table) < rows.count:
         raise short_of_points(source.place, rows.count, len(table))
     return table
-
-
-def short_of_points(place: str, promised: int, found: int, *, at_most: bool = False) -> InputError:
-    """Return the error for a file whose body is shorter than its header says."""
-    held = f"at most {found}" if at_most else f"{found}"
-    return InputError(
-        place, f"the header promises {promised} points, the file holds {held}", "get a complete copy of the file"
-    )
 
 
 @contextmanager
@@ -143,16 +66,16 @@ def text_lines(source: Input, offset: int = 0, encoding: str = "utf-8-sig") -> I
 
 def _read_fast(source: Input, rows: RowFormat, most: int | None) -> NDArray[np.void] | None:
     """Read rows by numpy alone, or with a little help; None if they need a closer look."""
-    plain = rows.kept is None and not (rows.commented and _is_sharp(source, rows))
+    plain = is_plain(source, rows)
     for helped in (False, True):
         if not (rows.loose if helped else plain):
             continue
         try:
             with text_lines(source, rows.offset, rows.encoding) as lines:
                 if helped:
-                    table = _load(_picked(lines, rows), rows, None, most)
+                    table = load_lines(picked_lines(lines, rows), rows, None, most)
                 else:
-                    table = _load(_short(lines), rows, rows.delimiter, most)
+                    table = load_lines(short_lines(lines, rows), rows, rows.delimiter, most)
         except (ValueError, DeprecationWarning):
             continue
         if rows.promised is not None and rows.promised != len(table):
@@ -161,7 +84,7 @@ def _read_fast(source: Input, rows: RowFormat, most: int | None) -> NDArray[np.v
     return None
 
 
-def _picked(lines: Iterable[str], rows: RowFormat) -> Iterator[str]:
+def picked_lines(lines: Iterable[str], rows: RowFormat) -> Iterator[str]:
     """Yield the columns of numbers with decimal points, up to the first line that needs a closer look.
 
     Raises
@@ -187,12 +110,23 @@ def _picked(lines: Iterable[str], rows: RowFormat) -> Iterator[str]:
         yield text.replace(",", ".")
 
 
-def _short(lines: Iterable[str]) -> Iterator[str]:
-    """Yield the lines up to one that is too long: numpy would take many times its size."""
+def short_lines(lines: Iterable[str], _: RowFormat) -> Iterator[str]:
+    """Yield the lines up to one that is too long: numpy would take many times its size.
+
+    Raises
+    ------
+    ValueError
+        At that line.
+    """
     for line in lines:
         if len(line) > LONGEST_LINE:
             raise ValueError("the line is too long")
         yield line
+
+
+def is_plain(source: Input, rows: RowFormat) -> bool:
+    """Return whether numpy alone may be able to read the rows."""
+    return rows.kept is None and not (rows.commented and _is_sharp(source, rows))
 
 
 def _is_sharp(source: Input, rows: RowFormat) -> bool:
@@ -209,13 +143,8 @@ def _is_sharp(source: Input, rows: RowFormat) -> bool:
     return False
 
 
-def wrong_count(place: str, promised: int, found: int) -> InputError:
-    """Return the error for a count of rows that is not theirs."""
-    fault = f"the count in the first line is {promised}, the file holds {found} points"
-    return InputError(place, fault, "get a complete copy of the file, or correct the count")
-
-
-def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: int | None) -> NDArray[np.void]:
+def load_lines(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: int | None) -> NDArray[np.void]:
+    """Return at most so many rows of lines, by numpy."""
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")  # about empty lines and an empty file, which are handled here
         warnings.simplefilter("error", DeprecationWarning)  # numpy 1 reads 300 as the uchar 44
@@ -228,115 +157,6 @@ def _load(lines: Iterable[str], rows: RowFormat, delimiter: str | None, most: in
             max_rows=most,
             ndmin=1,
         )
-
-
-def _checked(lines: Iterable[str], rows: RowFormat, place: str) -> Iterator[str]:
-    """Yield the lines with one space between columns, up to the first wrong line, which raises."""
-    yield from ("\n" for _ in range(rows.skip))
-    counts, found, marks = _Counts(rows.promised), 0, ""
-    for number, line in enumerate(islice(lines, rows.skip, None), rows.line + rows.skip):
-        where = f"{place}:{number}"
-        if len(line) > LONGEST_LINE:
-            raise InputError(where, "the line is too long for a row", "give every point a line")
-        columns = _row_of(line, rows)
-        if not columns or (rows.header and line.strip() == rows.header):
-            continue
-        bare = len(columns) == 1 < rows.width or (counts.expects(found) and not any(columns[1:]))
-        if rows.loose and bare and is_count(columns[0]) and counts.take(int(columns[0]), found, where):
-            continue
-        if len(columns) != rows.width:
-            fault = f"expected {rows.width} columns, found {len(columns)}"
-            raise InputError(where, fault, "give every row the same columns")
-        values = columns if rows.kept is None else [columns[place] for place in rows.kept]
-        if rows.loose:
-            values = ["" if is_missing(value) else value for value in values]
-        marks = _one_mark(marks, values, where)
-        values = [plain_number(value) for value in values]
-        yield " ".join(_filled(values, rows, where))
-        found += 1
-    counts.check(found, rows.width, place)
-
-
-class _Counts:
-    """The numbers of rows that lines of their own promise: above the rows, between blocks of them, or below.
-
-    Parameters
-    ----------
-    promised : int or None
-        The number in a line above the first row.
-    """
-
-    def __init__(self, promised: int | None) -> None:
-        self.promised = promised
-        self.below: int | None = None
-        self.doubtful = ""
-
-    def expects(self, found: int) -> bool:
-        """Return whether a block ends after this number of rows, so that another number may follow."""
-        return self.promised is not None and found in (self.promised, self.below)
-
-    def take(self, count: int, found: int, where: str) -> bool:
-        """Note a number that stands below `found` rows; return whether it may be a count."""
-        if self.promised is not None and not self.expects(found):
-            return False
-        if self.promised is None and found:  # the first number: of the rows above, or of those below
-            self.below = found if count == found else None
-            self.doubtful = where
-        self.promised = found + count
-        return True
-
-    def check(self, found: int, width: int, place: str) -> None:
-        """Refuse another number of rows than was promised; where that is doubtful, the line is what is wrong."""
-        if self.promised is None or self.expects(found):
-            return
-        if self.doubtful:
-            fault = f"expected {width} columns, found 1"
-            raise InputError(self.doubtful, fault, "give every row the same columns")
-        raise wrong_count(place, self.promised, found)
-
-
-def _row_of(line: str, rows: RowFormat) -> list[str]:
-    """Return the columns of a line, without its comment; a mark within a name begins none."""
-    row = uncommented(line) if rows.commented else line.strip()
-    if row == _END:
-        return []
-    for text in (row,) if rows.kept is None else dict.fromkeys((row, line.strip())):
-        columns = all_cells(text, rows.delimiter)
-        if columns and columns[-1] == "" and len(columns) != rows.width:
-            columns.pop()
-        if len(columns) == rows.width and row:
-            return columns
-    return split_row(row, rows.delimiter) if row else []
-
-
-def _one_mark(before: str, values: Iterable[str], where: str) -> str:
-    """Return the decimal mark of a file so far; refuse a second one.
-
-    Raises
-    ------
-    InputError
-        If a row has a comma for a decimal mark, and another row or value a point.
-    """
-    numbers = (value for value in values if SHARP not in value)
-    marks = {"," if "," in value else "." for value in numbers if DECIMAL_COMMA.fullmatch(value) or "." in value}
-    if len(marks | set(before)) > 1:
-        raise InputError(where, "some numbers have a decimal comma, others a point", "write all of them with a point")
-    return before or "".join(marks)
-
-
-def _filled(values: list[str], rows: RowFormat, where: str) -> list[str]:
-    """Return the values of a row, checked; where values may be missing, NaN for those that are."""
-    names = rows.dtype.names or ()
-    nowhere = not any(value for name, value in zip(names, values, strict=True) if name in ("x", "y", "z"))
-    out = []
-    for name, value in zip(names, values, strict=True):
-        if not value and rows.loose and (nowhere or name not in ("x", "y", "z")):  # a point has all three, or none
-            out.append("nan")
-            continue
-        kind = rows.dtype[name]
-        check_number(where, name, value, kind)
-        out.append(str(int(value)) if kind.kind in "iu" else value)  # numpy refuses -0 and +1
-    return out
 
 
 def _most_rows(source: Input, rows: RowFormat) -> int | None:

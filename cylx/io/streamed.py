@@ -2,34 +2,43 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import numpy as np
 
-from cylx.errors import InputError
-from cylx.io.clouds import read_cloud
+from cylx.errors import InputError, OutputError
+from cylx.io.clouds import check_scan
 from cylx.io.crs import las_source
 from cylx.io.formats import cloud_name, cloud_suffix, recognise
-from cylx.io.inputs import Input, check_unchanged, printable, sha256_of, stamp_of
-from cylx.io.las import las_parts, libraries_for
+from cylx.io.inputs import Input, check_unchanged, open_input, printable, sha256_of, stamp_of
+from cylx.io.las import las_parts, las_parts_of, libraries_for
+from cylx.io.las_blocks import blocks_hold, blocks_within, las_blocks
 from cylx.io.las_header import kept_header, las_header
-from cylx.io.names import coordinate_names, mended_names
+from cylx.io.names import coordinate_names
 from cylx.io.npy import columns_of, map_npy
-from cylx.io.ply_header import TYPES, Header, read_header
+from cylx.io.packed import unpacked
+from cylx.io.ply import ply_layout
+from cylx.io.ply_header import read_header
 from cylx.io.ptx import ptx_columns, ptx_facts, ptx_parts, ptx_scans
+from cylx.io.spooled import spool_cloud
 from cylx.io.withheld import withheld_rows
 from cylx.optional.extras import require
-from cylx.records import PointCloud, Source
+from cylx.records import PointCloud, Selection, Source
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from cylx.records import Crop
+
     Parts = Callable[[], Iterator[NDArray[np.void]]]
+
+Piece = TypeVar("Piece")
 
 ROWS = 1 << 18
 """Rows of a piece, at the most."""
@@ -50,12 +59,26 @@ class StreamedCloud:
         Structured: its columns.
     parts : callable
         Yields the table from its beginning, in pieces of `ROWS` rows; the last one may be shorter.
+    within : callable, optional
+        Yields what a box reaches of the table, as far as the file says where its points are: for each piece its first
+        row and its rows. Points beside the box may be among them.
     """
 
     source: Source
     rows: int
     dtype: np.dtype[np.void]
     parts: Parts
+    within: Callable[[Crop], Iterator[tuple[int, NDArray[np.void]]]] | None = None
+
+    def reached(self, crop: Crop | None) -> Iterator[tuple[int, NDArray[np.void]]]:
+        """Yield pieces of the table, each with the number of its first row, so that all points in a box are there."""
+        if crop is not None and self.within is not None:
+            yield from self.within(crop)
+            return
+        start = 0
+        for table in self.parts():
+            yield start, table
+            start += len(table)
 
     @property
     def bare(self) -> bool:
@@ -84,8 +107,8 @@ class StreamedCloud:
 def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, units: str | None = None) -> StreamedCloud:
     """Open a cloud to be read piece by piece.
 
-    LAS, LAZ, NPY, PTX and binary PLY are read from their file. Other formats are read once as a whole, and from then on
-    from a copy on the disk.
+    LAS, LAZ, NPY, PTX and binary PLY are read from their file. Other formats and packed files are read once, and from
+    then on from a copy on the disk; see `cylx.io.spooled`.
 
     Parameters
     ----------
@@ -105,15 +128,23 @@ def stream_cloud(path: str | Path, spool: Path, *, scan: int | None = None, unit
     ------
     InputError
         If it cannot be read.
+    OutputError
+        If the disk has no room for the copy.
     """
-    if str(path) != "-" and cloud_name(path) == str(path) and scan is None:
-        stamp, digest = stamp_of(path), sha256_of(path)
-        with _opened(path, digest) as source:
-            kind = recognise(source, cloud_suffix(path))
-            streamed = _STREAMED[kind](source, Path(path)) if kind in _STREAMED else None
+    packed = cloud_name(path) != str(path)
+    if str(path) == "-":
+        with open_input(path) as file, unpacked(file, packed=False) as source:
+            return _stated(_spooled(source, path, scan, spool), units)
+    stamp, digest = stamp_of(path), sha256_of(path)
+    with opened(path, digest) as file, unpacked(file, packed=packed) as source:
+        kind = recognise(source, cloud_suffix(path))
+        direct = source is file and scan is None and kind in _STREAMED
+        streamed = _STREAMED[kind](source, Path(path)) if direct else None
         if streamed is not None:
             return _stated(_guarded(streamed, path, stamp, digest), units)
-    return _spooled(read_cloud(path, scan=scan, units=units), spool)
+        cloud = _spooled(source, path, scan, spool)
+    check_unchanged(path, stamp, digest)
+    return _stated(cloud, units)
 
 
 def _stated(cloud: StreamedCloud, units: str | None) -> StreamedCloud:
@@ -153,14 +184,19 @@ def stream_arrays(pieces: Iterable[ArrayLike], spool: Path) -> StreamedCloud:
 def _guarded(cloud: StreamedCloud, path: str | Path, stamp: tuple[int, ...] | None, digest: str) -> StreamedCloud:
     """Return a cloud that checks at the end of each reading that its file is as it was."""
 
-    def parts() -> Iterator[NDArray[np.void]]:
+    def guarded(pieces: Iterator[Piece]) -> Iterator[Piece]:
         try:
-            yield from cloud.parts()
+            yield from pieces
         except OSError as error:
             _refuse(path, error)
         check_unchanged(path, stamp, digest)
 
-    return StreamedCloud(cloud.source, cloud.rows, cloud.dtype, parts)
+    within = cloud.within
+    return replace(
+        cloud,
+        parts=lambda: guarded(cloud.parts()),
+        within=None if within is None else lambda crop: guarded(within(crop)),
+    )
 
 
 def _refuse(path: str | Path, error: OSError) -> NoReturn:
@@ -169,7 +205,8 @@ def _refuse(path: str | Path, error: OSError) -> NoReturn:
 
 
 @contextmanager
-def _opened(path: str | Path, digest: str) -> Iterator[Input]:
+def opened(path: str | Path, digest: str) -> Iterator[Input]:
+    """Open a file as an input without copying it."""
     with Path(path).open("rb") as file:
         yield Input(printable(path), file, os.fstat(file.fileno()).st_size, digest, Path(path))
 
@@ -184,11 +221,17 @@ def _stream_las(source: Input, path: Path) -> StreamedCloud:
     about = _source(source, path, "las", **las_source(kept_header(source, facts), facts))
 
     def parts() -> Iterator[NDArray[np.void]]:
-        with _opened(path, source.sha256) as file:
+        with opened(path, source.sha256) as file:
             yield from _of_size(las_parts(file))
 
-    first = next(las_parts(source))
-    return StreamedCloud(about, facts.points, first.dtype, parts)
+    def within(crop: Crop) -> Iterator[tuple[int, NDArray[np.void]]]:
+        with opened(path, source.sha256) as file:
+            yield from las_parts_of(file, blocks_within(blocks, crop))
+
+    blocks, first = las_blocks(source, facts), next(las_parts(source))
+    if not blocks_hold(blocks, first):
+        blocks = ()
+    return StreamedCloud(about, facts.points, first.dtype, parts, within if blocks else None)
 
 
 def _of_size(parts: Iterator[NDArray[np.void]]) -> Iterator[NDArray[np.void]]:
@@ -213,34 +256,25 @@ def _stream_npy(source: Input, path: Path) -> StreamedCloud | None:
 
     def parts() -> Iterator[NDArray[np.void]]:
         for start in range(0, count, ROWS):
-            with _opened(path, source.sha256) as file:  # mapped anew: what was read before need not stay in memory
+            with opened(path, source.sha256) as file:  # mapped anew: what was read before need not stay in memory
                 yield columns_of(np.array(map_npy(file)[start : start + ROWS]), file.place)
 
     return StreamedCloud(_source(source, path, "npy"), count, dtype, parts)
 
 
 def _stream_ply(source: Input, path: Path) -> StreamedCloud | None:
-    header = read_header(source)
-    if header.text or any(element.has_lists for element in header.elements):
+    layout = ply_layout(read_header(source))
+    if layout is None:
         return None
-    count, dtype = header.vertex.count, _ply_rows(header)
-    start = header.size + sum(element.count * element.least_size(False) for element in header.elements[:-1])
+    count, dtype, start = layout
     return StreamedCloud(_source(source, path, "ply"), count, dtype, _from_raw(path, dtype, count, start))
-
-
-def _ply_rows(header: Header) -> np.dtype[np.void]:
-    """Return the type of a row of the vertices."""
-    order = ">" if header.format == "binary_big_endian" else "<"
-    properties = header.vertex.properties
-    names = mended_names([item.name for item in properties])
-    return np.dtype([(name, order + TYPES[item.type]) for name, item in zip(names, properties, strict=True)])
 
 
 def _stream_ptx(source: Input, path: Path) -> StreamedCloud:
     scans = ptx_scans(source)
 
     def parts() -> Iterator[NDArray[np.void]]:
-        with _opened(path, source.sha256) as file:
+        with opened(path, source.sha256) as file:
             yield from _of_size(ptx_parts(file, scans))
 
     about = _source(source, path, "ptx", **ptx_facts(scans))
@@ -255,20 +289,21 @@ _STREAMED: dict[str, Callable[[Input, Path], StreamedCloud | None]] = {
 }
 
 
-def _spooled(cloud: PointCloud, spool: Path) -> StreamedCloud:
+def _spooled(source: Input, path: str | Path, scan: int | None, spool: Path) -> StreamedCloud:
     """Write the table of a cloud to the disk."""
-    table = cloud.table
-    if table is None:
-        table = np.empty(cloud.rows, _BARE)
-        for place, axis in enumerate("xyz"):
-            table[axis] = cloud.spread(cloud.points[:, place], np.nan)
-    if table.dtype.hasobject:
-        fault = "has list properties, and cannot be cut into tiles"
-        raise InputError(printable(cloud.source.file), fault, "write it without them")
-    with spool.open("wb") as file:
-        for start in range(0, len(table), ROWS):
-            file.write(table[start : start + ROWS].tobytes())
-    return StreamedCloud(cloud.source, len(table), table.dtype, _from_raw(spool, table.dtype, len(table)))
+    kind = recognise(source, cloud_suffix(path))
+    check_scan(source, kind, scan)
+    try:
+        rows, dtype, facts = spool_cloud(source, kind, scan, spool, ROWS)
+    except MemoryError:
+        raise InputError(source.place, "does not fit into memory", "thin it out, or use a larger machine") from None
+    except OSError as error:
+        if error.errno not in (errno.ENOSPC, errno.EDQUOT):
+            _refuse(path, error)
+        fault, remedy = "cannot be written: no space left", "free some space, or choose another folder by --scratch"
+        raise OutputError(printable(spool.parent), fault, remedy) from None
+    about = _source(source, Path(path), kind, selection=Selection(scan=scan), **facts)
+    return StreamedCloud(about, rows, dtype, _from_raw(spool, dtype, rows))
 
 
 def _from_raw(path: Path, dtype: np.dtype[np.void], rows: int, offset: int = 0) -> Parts:

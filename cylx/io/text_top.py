@@ -20,7 +20,7 @@ from cylx.io.cells import (
     uncommented,
 )
 from cylx.io.columns import named_coordinates
-from cylx.io.rows import LONGEST_LINE
+from cylx.io.row_format import LONGEST_LINE
 
 if TYPE_CHECKING:
     import io

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, BinaryIO
 import numpy as np
 
 from cylx.errors import InputError
-from cylx.io.rows import RowFormat, read_rows, text_lines
+from cylx.io.row_format import RowFormat
+from cylx.io.rows import read_rows, text_lines
 from cylx.io.text_columns import Columns, choose_columns
 from cylx.io.text_top import read_top
 
@@ -27,12 +28,7 @@ _MARKS = {
 
 
 def read_xyz(source: Input) -> tuple[NDArray[np.void], Columns]:
-    """Read rows of x, y, z and further columns, as float64.
-
-    Comments begin with `#` or `//`. A line of names, or the last comment before the data that names x, y and z, names
-    the columns, wherever the coordinates are among them. Titles above it are skipped. A line of one number, as in .pts
-    files, is the number of rows. Columns of words are left out. A comma may be the decimal mark if it separates no
-    columns.
+    """Read rows of x, y, z and further columns, as float64; see `xyz_rows`.
 
     Parameters
     ----------
@@ -51,6 +47,33 @@ def read_xyz(source: Input) -> tuple[NDArray[np.void], Columns]:
         If this is not text, the names contradict the rows, or a row has non-numbers, fewer than three columns, or not
         as many as the first row.
     """
+    rows, columns = xyz_rows(source)
+    return read_rows(source, rows), columns
+
+
+def xyz_rows(source: Input) -> tuple[RowFormat, Columns]:
+    """Find out what the rows of a text are.
+
+    Comments begin with `#` or `//`. A line of names, or the last comment before the data that names x, y and z, names
+    the columns, wherever the coordinates are among them. Titles above it are skipped. A line of one number, as in .pts
+    files, is the number of rows. Columns of words are left out. A comma may be the decimal mark if it separates no
+    columns.
+
+    Parameters
+    ----------
+    source : Input
+
+    Returns
+    -------
+    rows : RowFormat
+    columns : Columns
+        Which columns were taken, and what to say about it.
+
+    Raises
+    ------
+    InputError
+        If this is not text, or the names contradict the rows.
+    """
     encoding = _encoding(source)
     with text_lines(source, 0, encoding) as lines:
         top = read_top(lines, source.place)
@@ -67,7 +90,7 @@ def read_xyz(source: Input) -> tuple[NDArray[np.void], Columns]:
         header=top.header,
         loose=True,
     )
-    return read_rows(source, rows), columns
+    return rows, columns
 
 
 def write_xyz(file: BinaryIO, suffix: str, table: NDArray[np.void]) -> None:

@@ -57,6 +57,8 @@ def points_of(
 ) -> Iterator[tuple[FloatArray, IndexArray]]:
     """Yield the finite selected points of clouds, one after the other, and their row numbers counted over all.
 
+    Of a box that is selected, only what it may reach is read where the files say where their points are.
+
     Parameters
     ----------
     clouds : iterable of StreamedCloud
@@ -67,15 +69,15 @@ def points_of(
     """
     before = 0
     for number, cloud in enumerate(clouds):
-        for table in cloud.parts():
+        for start, table in cloud.reached(selection.crop):
             if look is not None:
                 look(number, table)
             points = cloud.coordinates(table)
-            rows = np.arange(before, before + len(table))
+            rows = before + np.arange(start, start + len(table))
             keep = np.isfinite(points).all(axis=1)
             keep &= rows_selected(selection, points, table, rows, cloud.source.file)
-            before += len(table)
             yield points[keep], rows[keep]
+        before += cloud.rows
 
 
 def survey(clouds: list[StreamedCloud], selection: Selection, most: int, advance: Callable[[int], None]) -> Survey:

@@ -158,7 +158,8 @@ def _cut_of(
     if len(box.points) < 2 or box.depth >= DEEPEST:
         return None
     if size is not None:
-        low, high = box.points.min(axis=0), box.points.max(axis=0)
+        # a few points beyond the last multiple, such as noise has, are no reason for another tile
+        low, high = np.quantile(box.points, [LEFT_OUT, 1.0 - LEFT_OUT], axis=0)
         first, last = np.floor((low - corner) / size), np.floor((high - corner) / size)
         if (last > first).any():
             axis = int((last - first).argmax())

@@ -1,32 +1,36 @@
 """A plant made in pieces, extracted as a whole and in tiles: what is found, how long it takes, how much memory.
 
-A piece is a rack of 6 x 6 m with thirty pipes in layers, beams and a floor; four more pipes run through all pieces of a
-row. The memory is that of all processes together, looked at ten times a second.
+A piece is a rack of 6 x 6 m with fifteen pipes in layers, which lie on I-beams, and a floor; four more pipes run
+through all pieces of a row. The memory is that of all processes together, looked at ten times a second.
 """
 
 import argparse
 import json
+import resource
 import subprocess
 import sys
 import tempfile
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
+import laspy
 import numpy as np
 from runs import CYLX, truth_of, warm_up
 from tables import Bars, print_header, print_row
 
 from cylx.evaluation import evaluate
 
-SIDE, LAYERS, OF_LAYER, HEADERS, SIGMA = 6.0, 6, 5, 4, 0.002
+SIDE, LARGEST, OF_LAYER, HEADERS, SIGMA = 6.0, (0.2, 0.08, 0.15), 5, 4, 0.002
+BEAMS, BEAM = (1.0, 3.0, 5.0), 0.1
 A_PIECE = 1_000_000
 
 
 def layout(rng, corner):
-    """Give the pipes of a piece: (start, end, radius, seen angle)."""
-    pipes, z = [], 0.4
-    for layer in range(LAYERS):
-        most = (0.2, 0.08, 0.15, 0.05, 0.1, 0.2)[layer]
+    """Give the pipes of a piece: (start, end, radius, seen angle), and the height that each layer lies on."""
+    pipes, heights, z = [], [], 0.4
+    for layer, most in enumerate(LARGEST):
+        heights.append(z)
         radii = np.exp(rng.uniform(np.log(0.025), np.log(most), OF_LAYER))
         gaps = rng.dirichlet(np.full(OF_LAYER + 1, 2.0)) * (SIDE - 0.4 - 2.0 * radii.sum() - 0.05 * OF_LAYER) + 0.05
         across = 0.2
@@ -42,7 +46,17 @@ def layout(rng, corner):
             pipes.append((*(np.array(end) + corner for end in ends), float(radius), seen))
             across += radius
         z += 2.0 * most + 0.2
-    return pipes
+    return pipes, heights
+
+
+def on_beam(rng, place, height, turned, count):
+    """Give points on the two flanges and the web of a beam below a layer of pipes, across them."""
+    along, (across, down) = SIDE * rng.random(count), BEAM * rng.random((2, count))
+    part = rng.integers(3, size=count)
+    across[part == 2] = 0.5 * BEAM
+    down[part < 2] = BEAM * part[part < 2]
+    x, z = place + across, height - down
+    return np.column_stack([along, x, z] if turned else [x, along, z])
 
 
 def on_pipe(rng, start, end, radius, seen, count):
@@ -59,17 +73,17 @@ def piece(seed, column, row, headers):
     """Give the points and the pipes of a piece; the headers are those of its row."""
     rng = np.random.default_rng([7, seed, column, row])
     corner = np.array([column * SIDE, row * SIDE, 0.0])
-    pipes = layout(rng, corner)
+    pipes, heights = layout(rng, corner)
     step = np.array([SIDE, 0.0, 0.0])
     through = [(np.array([corner[0], y, z]), np.array([corner[0], y, z]) + step, r, 2 * np.pi) for y, z, r in headers]
     areas = np.array([np.linalg.norm(b - a) * r * seen for a, b, r, seen in [*pipes, *through]])
-    floor, beams = SIDE * SIDE, [(x, z) for x in (1.0, 3.0, 5.0) for z in np.linspace(0.3, 2.6, 6)]
-    total = areas.sum() + 0.5 * floor + len(beams) * SIDE * 0.1
+    floor, beam = SIDE * SIDE, 3.0 * SIDE * BEAM
+    total = areas.sum() + 0.5 * floor + len(BEAMS) * len(LARGEST) * beam
     counts = (A_PIECE * areas / total).astype(int)
     points = [on_pipe(rng, *one, n) for one, n in zip([*pipes, *through], counts, strict=True)]
-    flat = int(A_PIECE * SIDE * 0.1 / total)
-    for x, z in beams:
-        points.append(corner + [x, 0.0, z] + rng.random((flat, 3)) * [0.1, SIDE, 0.0])
+    flat = int(A_PIECE * beam / total)
+    for layer, height in enumerate(heights):
+        points += [corner + on_beam(rng, place, height, layer % 2, flat) for place in BEAMS]
     left = A_PIECE - sum(map(len, points))
     points.append(corner + rng.random((left, 3)) * [SIDE, SIDE, 0.0])
     cloud = np.concatenate(points)
@@ -77,21 +91,40 @@ def piece(seed, column, row, headers):
     return cloud[rng.permutation(A_PIECE)], pipes
 
 
+@contextmanager
+def writer(path, points):
+    """Yield what writes pieces of a cloud as LAZ, to a tenth of a millimetre, or as NPY."""
+    if path.suffix == ".npy":
+        with path.open("wb") as file:
+            about = {"descr": "<f8", "fortran_order": False, "shape": (points, 3)}
+            np.lib.format.write_array_header_1_0(file, about)
+            yield lambda cloud: file.write(cloud.tobytes())
+        return
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.scales = np.full(3, 1e-4)
+
+    def write(cloud):
+        record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
+        record.x, record.y, record.z = cloud.T
+        file.write_points(record)
+
+    with laspy.open(path, "w", header=header) as file:
+        yield write
+
+
 def make(path, pieces, seed):
-    """Write a plant of so many pieces as NPY, piece by piece, and its truth."""
+    """Write a plant of so many pieces, piece by piece, and its truth."""
     columns = int(np.ceil(np.sqrt(pieces)))
     truth, rng = [], np.random.default_rng([8, seed])
     rows = [
         [(r * SIDE + 0.5 + 1.4 * k, 3.2 + 0.3 * k, float(rng.uniform(0.05, 0.12))) for k in range(HEADERS)]
         for r in range(-(-pieces // columns))
     ]
-    with path.open("wb") as file:
-        about = {"descr": "<f8", "fortran_order": False, "shape": (pieces * A_PIECE, 3)}
-        np.lib.format.write_array_header_1_0(file, about)
+    with writer(path, pieces * A_PIECE) as write:
         for number in range(pieces):
             row, column = divmod(number, columns)
             points, pipes = piece(seed, column, row, rows[row])
-            file.write(points.tobytes())
+            write(points)
             truth += [(start, end, radius) for start, end, radius, _ in pipes]
     for r, headers in enumerate(rows):
         length = SIDE * min(columns, pieces - r * columns)
@@ -111,11 +144,11 @@ def make(path, pieces, seed):
 
 
 def weight(process):
-    """Give the memory of a process and all below it that no file stands behind, MB."""
+    """Give the proportional share of the memory of a process and all below it, mapped files included, MB."""
     total = 0.0
     try:
-        status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
-        total = int(status.split("RssAnon:")[1].split()[0]) / 1e3
+        about = Path(f"/proc/{process}/smaps_rollup").read_text(encoding="ascii")
+        total = int(about.split("\nPss:")[1].split()[0]) / 1e3
         children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii").split()
     except (OSError, IndexError):
         return total
@@ -123,29 +156,35 @@ def weight(process):
 
 
 def watched(command):
-    """Run a command; give its exit code, seconds, and peak memory."""
-    started, peak = time.perf_counter(), 0.0
+    """Run a command; give its exit code, seconds, seconds of processors, and peak memory."""
+    started, before, peak = time.perf_counter(), used(), 0.0
     with subprocess.Popen([str(word) for word in command], stderr=subprocess.DEVNULL) as child:
         while child.poll() is None:
             peak = max(peak, weight(child.pid))
             time.sleep(0.1)
-    return child.returncode, time.perf_counter() - started, peak
+    return child.returncode, time.perf_counter() - started, used() - before, peak
+
+
+def used():
+    """Give the seconds of processors that all processes begun here have taken, once they have ended."""
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return usage.ru_utime + usage.ru_stime
 
 
 def measure(scene, folder, extra, bars, most):
     """Print the row of a run; give its result."""
     output = Path(folder) / f"{scene.stem}.json"
     command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", *extra]
-    code, seconds, peak = watched(command)
+    code, seconds, busy, peak = watched(command)
     if code:
-        print_row(scene.stem, " ".join(extra) or "whole", *["-"] * 6)
+        print_row(scene.stem, " ".join(extra) or "whole", *["-"] * 7)
         return None
     result, truth = (json.loads(path.read_text(encoding="utf-8")) for path in (output, truth_of(scene)))
     told, tiles = evaluate(truth, result), result.get("tiles", {"count": 1, "joined": 0})
     verdict = bars.at_most(peak, most) if extra else ""
     name = " ".join(extra) or "whole"
-    row = (f"{told.f1:.4f}", f"{tiles['count']}", f"{tiles['joined']}", f"{seconds:.0f}", f"{peak:.0f}", verdict)
-    print_row(scene.stem, name, *row)
+    counts = f"{told.f1:.4f}", f"{tiles['count']}", f"{tiles['joined']}"
+    print_row(scene.stem, name, *counts, f"{seconds:.0f}", f"{busy:.0f}", f"{peak:.0f}", verdict)
     sys.stdout.flush()
     return output
 
@@ -153,7 +192,9 @@ def measure(scene, folder, extra, bars, most):
 def main():
     """Print a row a run."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", metavar="SCENE.npy", nargs="*", type=Path, help="made if missing: plant3.npy has 3 M")
+    parser.add_argument(
+        "scenes", metavar="SCENE.laz", nargs="*", type=Path, help="made if missing: plant3.laz has 3 M points"
+    )
     parser.add_argument("--whole", action="store_true", help="extract each without tiles, too, and compare")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--memory", default="2GB")
@@ -162,7 +203,7 @@ def main():
         if not (scene.is_file() and truth_of(scene).is_file()):
             make(scene, int("".join(filter(str.isdigit, scene.stem))), 0)
     bars, most = Bars(), float(a.memory.removesuffix("GB")) * 1000
-    print_header("scene", "run", "F1", "tiles", "joined", "seconds", "peak MB", "bar")
+    print_header("scene", "run", "F1", "tiles", "joined", "seconds", "of processors", "peak MB", "bar")
     with tempfile.TemporaryDirectory() as folder:
         warm_up(folder)
         for scene in a.scenes:

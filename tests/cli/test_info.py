@@ -1,6 +1,7 @@
 """`cylx info`: what is in a file."""
 
 import json
+import os
 import re
 from pathlib import Path
 
@@ -45,6 +46,27 @@ def test_json_has_the_same(run_cylx, tmp_path, scene):
     assert facts["extent"] == pytest.approx(float(np.linalg.norm(np.ptp(scene.points, axis=0))), abs=1e-6)
     assert set(facts["scene"]) == {"spacing", "noise"}
     assert facts["warnings"] == []
+
+
+@pytest.mark.skipif(os.name == "nt", reason="files with holes take their whole size there")
+def test_a_file_of_very_many_points_is_only_looked_at(run_cylx, tmp_path, scene):
+    many, piece = 1_000_000_000, 2000
+    table = np.lib.format.open_memmap(tmp_path / "huge.npy", "w+", np.float32, (many, 3))  # takes no place as yet
+    for first in np.linspace(0, many - (1 << 16), 16).astype(int):
+        table[first : first + (1 << 16)] = np.nan
+        table[first : first + piece // 16] = scene.points[: piece // 16]
+    table[:piece] = scene.points
+    del table
+    shown = run_cylx("info", tmp_path / "huge.npy", "--json")
+    assert shown.exit_code == 0
+    facts = json.loads(shown.stdout)
+    assert (facts["points"], facts["format"]) == (many, "npy")
+    assert "finite" not in facts
+    assert "sha256" not in facts
+    assert facts["sampled"] == piece + 15 * (piece // 16)
+    assert facts["extract_memory_bytes"] > 1e11
+    assert facts["warnings"][-1]["kind"] == "sample"
+    assert f"{facts['sampled']} of them looked at" in run_cylx("info", tmp_path / "huge.npy").stdout
 
 
 def test_the_radii_are_those_that_are_looked_for(run_cylx, tmp_path, scene):
@@ -126,4 +148,4 @@ def test_every_warning_is_told_of():
     page = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
     table = page.partition("## A first look\n")[2].partition("\n## ")[0]
     assert set(re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)) == kinds
-    assert len(kinds) == 13
+    assert len(kinds) == 14

@@ -1,10 +1,12 @@
 """Kill runs at random moments, and start two at once: no half file, no leftover, and the same bytes in the end.
 
 Run it from the root of the project: `python -m tests.faults.kills --kills 200 --pairs 20`. It prints a table, and its
-exit code is 1 if anything was wrong.
+exit code is 1 if anything was wrong. `--ways tiles --kills 50` kills runs in tiles alone, or one of their processes,
+which has to be replaced without anybody's doing.
 """
 
 import argparse
+import contextlib
 import os
 import random
 import signal
@@ -15,21 +17,26 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
+
 from cylx import synthetic
 from cylx.io import write_cloud
 from tests.support.patience import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[2]
 SIGNALS = ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT")
+WORKER = "a worker"
+"""Kill a process that works for the run instead of the run."""
 BATCH = ["scans", "--out-dir", "{out}"]
 WAYS = {
     "single": ["scans/0.ply", "-o", "{out}/", "--report", "{out}/", "--rejected", "{out}/"],
     "batch": BATCH,
     "batch --jobs 2": [*BATCH, "--jobs", "2"],
+    "tiles": ["scans/0.ply", "-o", "{out}/", "--tile", "{tile}", "--jobs", "2"],
 }
 EVERY = 20
 """Kills after which the faults so far are counted."""
-QUIET_END = {"SIGKILL": -9, "SIGTERM": -15, "SIGHUP": -1, "SIGINT": 130}
+QUIET_END = {WORKER: 0, "SIGKILL": -9, "SIGTERM": -15, "SIGHUP": -1, "SIGINT": 130}
 
 
 class Bench:
@@ -39,7 +46,10 @@ class Bench:
         self.folder = folder
         (folder / "scans").mkdir()
         for seed in range(scans):
-            write_cloud(folder / "scans" / f"{seed}.ply", synthetic.single(points=points, seed=seed).points)
+            cloud = synthetic.single(points=points, seed=seed).points
+            write_cloud(folder / "scans" / f"{seed}.ply", cloud)
+            if seed == 0:
+                self.tile = f"{0.45 * float(np.ptp(cloud, axis=0).max()):.3g}"
         self.whole, self.seconds = {}, {}
         self.run(ways[0], "warm")
         for way in ways:
@@ -51,7 +61,15 @@ class Bench:
     def command(self, way, out, *options):
         heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"  # a shell may have it ignored
         code = f"{heard}; from cylx.__main__ import run; run()"
-        return [sys.executable, "-c", code, "extract", "-q", *(part.format(out=out) for part in WAYS[way]), *options]
+        return [
+            sys.executable,
+            "-c",
+            code,
+            "extract",
+            "-q",
+            *(part.format(out=out, tile=self.tile) for part in WAYS[way]),
+            *options,
+        ]
 
     def start(self, way, out, *options):
         """Start a run in its own group of processes."""
@@ -74,7 +92,11 @@ class Bench:
         """Kill a run, look at what is left, and let another one finish it; give what was wrong."""
         process = self.start(way, out)
         time.sleep(after)
-        os.killpg(process.pid, getattr(signal, name))
+        if name != WORKER:
+            os.killpg(process.pid, getattr(signal, name))
+        elif workers := below(process.pid):
+            with contextlib.suppress(ProcessLookupError):  # it is done
+                os.kill(workers[-1], signal.SIGKILL)
         _, said = process.communicate(timeout=PATIENCE)
         wrong = self.faults_of_killed(name, way, out, process.returncode, said.decode())
         resumed = self.run(way, out, "--resume")
@@ -108,20 +130,32 @@ class Bench:
 
 
 def contents(folder):
-    return {path.name: path.read_bytes() for path in folder.iterdir()} if folder.is_dir() else {}
+    """Give the files of a folder."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()} if folder.is_dir() else {}
 
 
 def hidden(folder):
-    return [name for name in contents(folder) if name.startswith(".")]
+    """Give the temporary files and folders in a folder."""
+    return [path.name for path in folder.iterdir() if path.name.startswith(".")] if folder.is_dir() else []
 
 
-def torture(kills, pairs, seed, show=print, **scans):
+def below(process):
+    """Give the processes that a process has started, on Linux."""
+    try:
+        return [int(one) for one in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+    except OSError:
+        return []
+
+
+def torture(kills, pairs, seed, show=print, ways=tuple(WAYS), **scans):
     """Kill so many runs, and start so many pairs; give the faults. `scans` are the settings of the bench."""
     rng, faults, counts = random.Random(seed), [], Counter()
     with tempfile.TemporaryDirectory(prefix="cylx-kills-") as place:
-        bench = Bench(Path(place), **scans)
+        bench = Bench(Path(place), tuple(dict.fromkeys([*ways, *(["single"] if pairs else [])])), **scans)
         for index in range(kills):
-            way, name = list(WAYS)[index % len(WAYS)], SIGNALS[index % len(SIGNALS)]
+            way = ways[index % len(ways)]
+            names = (*SIGNALS[1:], SIGNALS[0], WORKER) if way == "tiles" else SIGNALS
+            name = names[(index % len(ways) + index // len(ways)) % len(names)]
             after = bench.seconds[way] * rng.uniform(0.15, 1.05)
             wrong = bench.kill_one(name, way, after, f"out{index}")
             counts[way, name, bool(wrong)] += 1
@@ -141,8 +175,9 @@ def main():
     parser.add_argument("--kills", type=int, default=200)
     parser.add_argument("--pairs", type=int, default=20)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
     asked = parser.parse_args()
-    faults = torture(asked.kills, asked.pairs, asked.seed)
+    faults = torture(asked.kills, asked.pairs, asked.seed, ways=tuple(asked.ways))
     print("\n".join(faults))
     return 1 if faults else 0
 

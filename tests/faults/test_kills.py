@@ -10,4 +10,4 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no such sig
 
 
 def test_runs_that_are_killed_leave_nothing_half_and_go_on_to_the_same_bytes():
-    assert torture(kills=3, pairs=1, seed=1, show=lambda line: None, scans=2, points=500) == []
+    assert torture(kills=4, pairs=1, seed=1, show=lambda line: None, scans=2, points=500) == []

@@ -1,12 +1,17 @@
 """What is read in pieces is what is read as a whole."""
 
+import contextlib
+import errno
 import gzip
+import io
+import os
+import tracemalloc
 
 import numpy as np
 import pytest
 
-from cylx.errors import InputError
-from cylx.io import read_cloud, stream_arrays, stream_cloud, write_cloud
+from cylx.errors import InputError, OutputError
+from cylx.io import isolated, isolated_child, read_cloud, stream_arrays, stream_cloud, write_cloud
 from cylx.io import streamed as module
 
 
@@ -30,7 +35,7 @@ def same_as_whole(path, spool):
         assert (cloud.coordinates(table) == whole.points).all()
         if whole.table is not None:
             assert table.dtype.names == whole.table.dtype.names == cloud.dtype.names
-            assert all((table[name] == whole.table[name]).all() for name in table.dtype.names)
+            assert all(np.array_equal(table[name], whole.table[name], equal_nan=True) for name in table.dtype.names)
     assert (cloud.rows, cloud.bare) == (1000, whole.table is None)
     assert cloud.source.sha256 == whole.source.sha256
     assert cloud.source.format == whole.source.format
@@ -62,6 +67,123 @@ def test_rows_that_are_withheld_are_no_points(tmp_path, points):
 def test_arrays_on_the_disk(tmp_path, points, order):
     np.save(tmp_path / "scan.npy", np.asarray(points, order=order))
     same_as_whole(tmp_path / "scan.npy", tmp_path / "spool")
+
+
+def text_of(points, mark=" ", every=lambda row: row):
+    """Give rows of text."""
+    return "".join(every(mark.join(f"{value:.3f}" for value in point)) + "\n" for point in points)
+
+
+TEXTS = {
+    "bare": text_of,
+    "a count": lambda points: f"{len(points)}\n{text_of(points)}",
+    "names and commas": lambda points: f"x,y,z\n{text_of(points, ',')}",
+    "comments and empty lines": lambda points: f"# made\n\n{text_of(points, every=lambda row: row + '  # a point')}",
+    "words": lambda points: text_of(points, every=lambda row: f"{row} wall"),
+    "decimal commas": lambda points: text_of(points).replace(".", ","),
+    "a line that needs a closer look at the end": lambda points: f'{text_of(points[:-1])}"1" 2 3\n',
+    "a gap in the last block": lambda points: f"x;y;z;i\n{text_of(points[:-1], ';', lambda row: row + ';4')}1;2;3;\n",
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_text_by_blocks(tmp_path, points, name):
+    path = tmp_path / "scan.txt"
+    path.write_text(TEXTS[name](points), encoding="utf-8")
+    same_as_whole(path, tmp_path / "spool")
+
+
+BROKEN = {
+    "a word in a late block": lambda points: f"{text_of(points[:950])}1 2 high\n{text_of(points[951:])}",
+    "a row too short": lambda points: f"{text_of(points[:950])}1 2\n{text_of(points[951:])}",
+    "another count": lambda points: f"{len(points) + 1}\n{text_of(points)}",
+    "two decimal marks": lambda points: f"{text_of(points[:500]).replace('.', ',')}{text_of(points[500:])}",
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_damaged_text_is_refused_as_in_one_piece(tmp_path, points, name):
+    path = tmp_path / "scan.txt"
+    path.write_text(BROKEN[name](points), encoding="utf-8")
+    with pytest.raises(InputError) as whole:
+        read_cloud(path)
+    with pytest.raises(InputError) as parts:
+        stream_cloud(path, tmp_path / "spool")
+    assert str(parts.value) == str(whole.value)
+
+
+def test_text_takes_no_more_than_a_block(tmp_path, points):
+    path, many = tmp_path / "scan.xyz", 250
+    path.write_text(text_of(np.tile(points, (many, 1))), encoding="utf-8")
+    tracemalloc.start()
+    try:
+        cloud = stream_cloud(path, tmp_path / "spool")
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert cloud.rows == 1000 * many
+    table = cloud.rows * cloud.dtype.itemsize
+    assert peak < 0.5 * table < (tmp_path / "spool").stat().st_size
+
+
+def test_ascii_ply_by_blocks(tmp_path, points):
+    head = "ply\nformat ascii 1.0\nelement list 2\nproperty int a\nelement vertex 1000\n"
+    head += "".join(f"property float {axis}\n" for axis in "xyz") + "property uchar ring\nend_header\n1\n2\n"
+    path = tmp_path / "scan.ply"
+    path.write_text(head + text_of(points, every=lambda row: row + " 7"), encoding="utf-8")
+    same_as_whole(path, tmp_path / "spool")
+    path.write_text(head + text_of(points[:-1], every=lambda row: row + " 7"), encoding="utf-8")
+    with pytest.raises(InputError, match="the header promises 1000 points, the file holds 999"):
+        stream_cloud(path, tmp_path / "spool")
+
+
+def test_e57_goes_from_its_process_to_the_disk(tmp_path, points, monkeypatch):
+    pye57 = pytest.importorskip("pye57")
+    path = tmp_path / "scan.e57"
+    with contextlib.closing(pye57.E57(str(path), mode="w")) as file:
+        for part in (points[:400], points[400:]):
+            columns = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), part.T.copy(), strict=True))
+            file.write_scan_raw({**columns, "intensity": np.arange(float(len(part)))})
+    same_as_whole(path, tmp_path / "spool")
+    one = stream_cloud(path, tmp_path / "spool", scan=1)
+    assert (one.rows, one.source.selection.scan) == (600, 1)
+    assert np.abs(one.coordinates(next(one.parts())) - points[400:700]).max() < 1e-6  # written in single precision
+    monkeypatch.setattr(isolated, "_target", None)  # nothing else takes the points
+    assert stream_cloud(path, tmp_path / "spool").rows == 1000
+
+
+def test_a_disk_without_room_for_the_copy_is_told_of(tmp_path, points, monkeypatch):
+    write_cloud(tmp_path / "scan.xyz", points)
+
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(module, "spool_cloud", full)
+    with pytest.raises(OutputError, match="cannot be written: no space left; free some space"):
+        stream_cloud(tmp_path / "scan.xyz", tmp_path / "spool")
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="the disk cannot be asked for room")
+def test_the_room_for_points_is_taken_first(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    (tmp_path / "spool").touch()
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    monkeypatch.setattr(isolated_child, "_allow_table", lambda size, rate: None)
+    with pytest.raises(isolated_child.NoRoomError, match="No space left"):
+        isolated_child.Target(str(tmp_path / "spool"), 1 << 20, 1, reserve=True)(10, np.dtype([("x", "f8")]))
+    assert len(isolated_child.Target(str(tmp_path / "spool"), 1 << 20, 1)(10, np.dtype([("x", "f8")]))) == 10
+
+
+def test_standard_input_and_a_scan_that_is_none(tmp_path, points, monkeypatch):
+    write_cloud(tmp_path / "scan.ply", points)
+    with (tmp_path / "scan.ply").open("rb") as file:
+        monkeypatch.setattr("sys.stdin", io.TextIOWrapper(file))
+        cloud = stream_cloud("-", tmp_path / "spool")
+        assert (np.concatenate([cloud.coordinates(part) for part in cloud.parts()]) == points).all()
+    with pytest.raises(InputError, match="neither E57 nor PTX"):
+        stream_cloud(tmp_path / "scan.ply", tmp_path / "spool", scan=0)
 
 
 def test_a_packed_file_and_one_of_the_other_byte_order(tmp_path, points):

@@ -42,6 +42,18 @@ def test_the_size_is_kept_from_the_corner_on(points):
     assert places == pytest.approx(np.rint(places))
 
 
+def test_what_noise_puts_beyond_a_multiple_gets_no_tile_of_its_own():
+    rng = np.random.default_rng(5)
+    two = rng.uniform(0, [4, 2, 2], size=(5000, 3))
+    noisy = two + 0.004 * rng.standard_normal(two.shape)
+    tree = grow_tree(noisy, 1e9, size=2.0, corner=noisy.min(axis=0))
+    assert len(tree) == 2
+    annex = np.concatenate([noisy, rng.uniform([9, 0, 0], [10, 1, 1], size=(45, 3))])  # less than one in a hundred
+    tree = grow_tree(annex, 1e9, size=2.0, corner=annex.min(axis=0))
+    owners = {tile: inside for tile, inside, _ in tree.spread(annex, 0.0)}
+    assert any((inside >= 5000).all() and len(inside) == 45 for inside in owners.values())
+
+
 def test_what_cannot_be_cut_is_one_tile():
     same = np.ones((100, 3))
     tree = grow_tree(same, 10, size=None, corner=np.ones(3))

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from rich.progress import Progress, TaskID
 
 _NARROWEST, _WIDE_ENOUGH = 80, 200
+_SOON = 5.0
+"""Of less time nothing is said, seconds."""
 _COMPILING = "compiling (the first time only)"
 
 
@@ -48,8 +50,9 @@ class Messages:
             return
         from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(24), TextColumn("{task.fields[count]}"))
-        with Progress(*columns, TimeElapsedColumn(), console=_console(sys.stderr), transient=True) as display:
+        count, left = TextColumn("{task.fields[count]}"), TextColumn("{task.fields[left]}")
+        columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(24), count, TimeElapsedColumn(), left)
+        with Progress(*columns, console=_console(sys.stderr), transient=True) as display:
             yield ProgressObserver(display)
 
     @contextmanager
@@ -81,6 +84,7 @@ class ProgressObserver:
         self.done: dict[str, int] = {}
         self.name = ""
         self.total: int | None = None
+        self.started, self.before = 0.0, 0
 
     def stage_started(self, name: str, total: int | None) -> None:
         """Show a stage in place of the previous one."""
@@ -89,13 +93,15 @@ class ProgressObserver:
         self.name, self.total = name, total
         done = self.done.setdefault(name, 0)  # of its parts before
         shown = _COMPILING if name == "compiling" else name
-        self.task = self.display.add_task(shown, total=total, completed=done, count=self._count())
+        self.started, self.before = perf_counter(), done
+        self.task = self.display.add_task(shown, total=total, completed=done, count=self._count(), left="")
 
     def stage_advanced(self, steps: int) -> None:
         """Move the bar."""
         if self.task is not None:
             self.done[self.name] += steps
-            self.display.update(self.task, advance=steps, count=self._count())
+            left = time_left(perf_counter() - self.started, self.before, self.done[self.name], self.total)
+            self.display.update(self.task, advance=steps, count=self._count(), left=left)
 
     def _count(self) -> str:
         done = self.done[self.name]
@@ -105,6 +111,32 @@ class ProgressObserver:
 
     def stage_finished(self, name: str, seconds: float) -> None:
         """Keep the line until the next stage starts."""
+
+
+def time_left(elapsed: float, before: int, done: int, total: int | None) -> str:
+    """Return how long a step goes on if it goes on as before; nothing if it will soon be over, or cannot be told.
+
+    Parameters
+    ----------
+    elapsed : float
+        Since it began, seconds.
+    before, done, total : int
+        Steps that were done when it began, and are now, and will be in the end, if that is known.
+
+    Examples
+    --------
+    >>> time_left(60.0, 0, 2, 10)
+    '4:00 left'
+    >>> time_left(7200.0, 5, 6, 8)
+    '4:00:00 left'
+    """
+    if total is None or done <= before or elapsed < _SOON:
+        return ""
+    seconds = round(elapsed * max(total - done, 0) / (done - before))
+    if seconds < _SOON:
+        return ""
+    minutes, hours = seconds // 60, seconds // 3600
+    return f"{hours}:{minutes % 60:02}:{seconds % 60:02} left" if hours else f"{minutes}:{seconds % 60:02} left"
 
 
 class Observers:
