@@ -13,6 +13,7 @@ from cylx.records import CylinderFit
 from cylx.runs.adding import add_caps, add_collars, add_gaps, add_junctions, add_reducers
 from cylx.runs.answer import Traced, answer_of, in_order
 from cylx.runs.assumed import add_assumed
+from cylx.runs.chains import settle_chains
 from cylx.runs.crossings import split_crossings
 from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
@@ -88,6 +89,7 @@ def trace_runs(
     add_bends(trace, near)
     add_reducers(trace, near)
     add_assumed(trace, near)
+    settle_chains(trace, near)
     settle_radii(trace)
     trace = in_order(trace)
     runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)

@@ -1,0 +1,331 @@
+"""Elbows with short pipes between them, fitted together: each point says once what it knows of all their axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cylx.geometry.arrays import FloatArray, IndexArray
+from cylx.records import Elbow
+from cylx.runs.bend import Bend
+from cylx.runs.bend_fit import SKEWED, axes_of, bend_of
+from cylx.runs.bend_normal import fill_bend_normal
+from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings, tilted
+from cylx.runs.tracing import Trace
+
+SHORT = 6.0
+"""The axis of a pipe shorter than so many radii is told together with the elbows at its ends."""
+WIDE, STEPS = 1.8, 10
+"""Points up to so many times their usual width have a say in the first steps of the fit; steps in all."""
+LOOSE_OFFSET, LOOSE_TILT = 1.0, 0.5
+"""What is known of a short pipe without its points: standard deviations, in radii and radians."""
+ABOUT = 0.6
+"""Points within so many radii of the surface are looked at."""
+LEAST_KEPT = 0.9
+"""A fit of all that leaves an elbow a smaller share of its points is none."""
+MOST_POINTS = 1200
+"""Of one elbow or pipe."""
+
+
+@dataclass(slots=True, eq=False)
+class _Chain:
+    """Pipes, and the elbows between them, with the points of each, and where each is in the vector of unknowns."""
+
+    pipes: dict[int, Pipe]
+    elbows: dict[int, Elbow]
+    short: frozenset[int]
+    arcs: dict[int, FloatArray]
+    straights: dict[int, FloatArray]
+    weights: dict[tuple[str, int], float]
+    radius: float
+    spread: float
+    place: dict[int, int]
+    bends: dict[int, int]
+
+
+def settle_chains(trace: Trace, near: Surroundings) -> None:
+    """Fit elbows that short pipes join together with these, and move all of them there.
+
+    Parameters
+    ----------
+    trace : Trace
+        Its elbows, and the pipes that they join, change.
+    near : Surroundings
+    """
+    if near.cells is None:
+        return
+    for pipes, elbows in _chains(trace):
+        chain = _gathered(trace, near, pipes, elbows)
+        solved = _solved(chain)
+        if solved is not None:
+            _settle(trace, near, chain, *solved)
+
+
+def _chains(trace: Trace) -> list[tuple[list[int], list[int]]]:
+    """Return the pipes and the elbows of each chain: elbows that share a short pipe are of one."""
+    of_pipe: dict[int, list[int]] = {}
+    for k, one in enumerate(trace.fittings):
+        if isinstance(one, Elbow) and one.inliers > 0:
+            for index in one.joins:
+                of_pipe.setdefault(index, []).append(k)
+    out, seen = [], set[int]()
+    for index in sorted(of_pipe):
+        if index in seen or not _is_short(trace.pipes[index]):
+            continue
+        pipes, elbows, open_ones = {index}, set[int](), [index]
+        while open_ones:
+            here = open_ones.pop()
+            seen.add(here)
+            for k in of_pipe[here]:
+                elbows.add(k)
+                for other in trace.fittings[k].joins:
+                    if other not in pipes:
+                        pipes.add(other)
+                        if _is_short(trace.pipes[other]):
+                            open_ones.append(other)
+        out.append((sorted(pipes), sorted(elbows)))
+    return out
+
+
+def _is_short(pipe: Pipe) -> bool:
+    return pipe.length < SHORT * pipe.radius
+
+
+def _bend(one: Elbow, pipes: dict[int, Pipe] | Sequence[Pipe]) -> Bend:
+    ends = _ends(one)
+    return bend_of(pipes[one.joins[0]], pipes[one.joins[1]], ends, np.zeros(8), one.bend_radius)[0]
+
+
+def _ends(one: Elbow) -> tuple[End, End]:
+    first, second = one.ends
+    assert first != "side"
+    assert second != "side"
+    return first, second
+
+
+def _about(bend: Bend, radius: float, near: Surroundings) -> IndexArray:
+    """Return all points about an arc."""
+    outer = (1.0 + ABOUT) * radius
+    low = max(0.0, bend.bend_radius - outer) if bend.angle < math.pi else 0.0
+    if bend.bend_radius < outer:
+        found = near.about(bend.meeting, bend.normal, -outer, outer, bend.tangent + 2.0 * outer)
+    else:
+        found = near.about(bend.center, bend.normal, -outer, outer, bend.bend_radius + outer, low)
+    along, distances = bend.coordinates(near.points[found])
+    on = (along > -0.5 * radius) & (along < bend.length + 0.5 * radius) & (np.abs(distances - radius) < ABOUT * radius)
+    return found[on]
+
+
+def _thinned(points: FloatArray) -> tuple[FloatArray, float]:
+    """Return no more than so many points, and how many each of them stands for."""
+    step = max(1, -(-len(points) // MOST_POINTS))
+    some = np.ascontiguousarray(points[::step])
+    return some, len(points) / max(len(some), 1)
+
+
+def _gathered(trace: Trace, near: Surroundings, pipes: list[int], elbows: list[int]) -> _Chain:
+    """Return a chain with its points: those of its own pipes and elbows, and those that are free."""
+    members = {index: trace.pipes[index] for index in pipes}
+    bends = {k: trace.fittings[k] for k in elbows}
+    short = frozenset(index for index in pipes if _is_short(trace.pipes[index]))
+    labels = [pipe.label for pipe in members.values()]
+    claimed = np.unique(np.concatenate([trace.points[k] for k in elbows]))
+    known = {k: one for k, one in bends.items() if isinstance(one, Elbow)}
+    sizes = [pipe.radius for index, pipe in members.items() if index not in short] or [
+        one.radius for one in known.values()
+    ]
+    chain = _Chain(
+        members, known, short, {}, {}, {}, float(np.mean(sizes)), max(p.spread for p in members.values()), {}, {}
+    )
+    for k, one in known.items():
+        found = _about(_bend(one, trace.pipes), one.radius, near)
+        own = near.free(found, labels) | np.isin(found, claimed)
+        chain.arcs[k], chain.weights["arc", k] = _thinned(near.points[found[own]])
+        chain.bends[k] = 4 * len(pipes) + 1 + len(chain.bends)
+    for number, index in enumerate(pipes):
+        chain.place[index] = 4 * number
+        if index in short:
+            pipe = members[index]
+            half, outer = 0.5 * pipe.length + 0.5 * pipe.radius, (1.0 + ABOUT) * pipe.radius
+            found = near.about(pipe.middle, pipe.direction, -half, half, outer, (1.0 - ABOUT) * pipe.radius)
+            own = near.free(found, labels) | np.isin(found, claimed)
+            chain.straights[index], chain.weights["pipe", index] = _thinned(near.points[found[own]])
+    return chain
+
+
+def _solved(chain: _Chain) -> tuple[FloatArray, FloatArray] | None:
+    """Return the unknowns of a chain after its fit, and their covariance; None if that fails."""
+    count = 4 * len(chain.pipes) + 1 + len(chain.bends)
+    tube, radius, spread = 4 * len(chain.pipes), chain.radius, chain.spread
+    information, base = np.zeros((count, count)), np.zeros(count)
+    certain = 0.0
+    for index, first in chain.place.items():
+        pipe = chain.pipes[index]
+        known = pipe.covariance[:4, :4] + np.diag([*[(0.002 * radius) ** 2] * 2, *[1e-6] * 2])
+        if index in chain.short:
+            known = np.diag([*[(LOOSE_OFFSET * radius) ** 2] * 2, *[LOOSE_TILT**2] * 2])
+        else:
+            certain += 1.0 / max(float(pipe.covariance[4, 4]), 1e-300)
+        information[first : first + 4, first : first + 4] = np.linalg.inv(known)
+    information[tube, tube] = 1.0 / (1.0 / max(certain, 1e-3 / radius**2) + (0.01 * radius) ** 2)
+    base[tube] = radius
+    for k, place in chain.bends.items():
+        base[place] = chain.elbows[k].bend_radius
+        information[place, place] = 1e-9 / radius**2
+    small = np.full(count, 1e-4 * radius)
+    for first in chain.place.values():
+        small[first + 2 : first + 4] = 1e-5
+    state, covariance = base.copy(), np.zeros((count, count))
+    for step in range(STEPS):
+        width = ON_SURFACE * 1.5 * spread * (WIDE if step < STEPS // 3 else 1.0)
+        normal, gradient = information.copy(), information @ (state - base)
+        for place in chain.bends.values():
+            gradient[place] -= information[place, place] * (state - base)[place]
+        _add_arcs(chain, state, small, width, normal, gradient)
+        _add_straights(chain, state, width, normal, gradient)
+        try:
+            covariance = np.linalg.inv(normal)
+        except np.linalg.LinAlgError:
+            return None
+        change = covariance @ gradient
+        state = state - change
+        if not np.isfinite(state).all():
+            return None
+        for place in chain.bends.values():
+            state[place] = max(state[place], 0.0)
+        if step > STEPS // 3 and float(np.abs(change / small).max()) < 10.0:
+            break
+    return (state, covariance) if np.isfinite(state).all() and np.isfinite(covariance).all() else None
+
+
+def _add_arcs(
+    chain: _Chain, state: FloatArray, small: FloatArray, width: float, normal: FloatArray, gradient: FloatArray
+) -> None:
+    """Add what the points on the arcs say."""
+    part, line = np.empty((10, 10)), np.empty(10)
+    tube = 4 * len(chain.pipes)
+    reach = np.array([chain.spread, width, 0.0, 0.0, 0.0, 0.0, SKEWED * chain.radius])
+    for k, one in chain.elbows.items():
+        first, second = (chain.place[index] for index in one.joins)
+        which = np.array([*range(first, first + 4), *range(second, second + 4), tube, chain.bends[k]])
+        ends = _ends(one)
+        signs = np.array([1.0 if ends[0] == "end" else -1.0, 1.0 if ends[1] == "start" else -1.0])
+        axes = axes_of(chain.pipes[one.joins[0]], chain.pipes[one.joins[1]])
+        weight = chain.weights["arc", k]
+        reach[6] = SKEWED * chain.radius * math.sqrt(weight)
+        fill_bend_normal(chain.arcs[k], axes, signs, state[which], small[which], reach, part, line)
+        normal[np.ix_(which, which)] += weight * part
+        gradient[which] += weight * line
+
+
+def _add_straights(chain: _Chain, state: FloatArray, width: float, normal: FloatArray, gradient: FloatArray) -> None:
+    """Add what the points on the short pipes say: those between the arcs at both ends."""
+    tube = 4 * len(chain.pipes)
+    moved = {index: _moved(chain, index, state) for index in chain.pipes}
+    for index, points in chain.straights.items():
+        pipe = _between(chain, index, moved, state)
+        away = points - pipe.middle
+        heights = away @ pipe.direction
+        radial = away - heights[:, None] * pipe.direction
+        distances = np.sqrt(np.einsum("ij,ij->i", radial, radial))
+        errors = distances - state[tube]
+        used = (np.abs(heights) < 0.5 * pipe.length) & (np.abs(errors) < width) & (distances > 0)
+        if not used.any():
+            continue
+        outward, e = radial[used] / distances[used][:, None], errors[used]
+        weights = (1.0 - (e / width) ** 2) ** 2 * chain.weights["pipe", index] / chain.spread**2
+        first, second = chain.pipes[index].basis
+        # heights from where the offsets are told
+        lever = (points[used] - chain.pipes[index].middle) @ pipe.direction
+        across = np.column_stack([outward @ first, outward @ second])
+        rows = np.column_stack([-across, -lever[:, None] * across, -np.ones(len(e))])
+        which = np.array([*range(chain.place[index], chain.place[index] + 4), tube])
+        normal[np.ix_(which, which)] += (rows * weights[:, None]).T @ rows
+        gradient[which] += rows.T @ (weights * e)
+
+
+def _moved(chain: _Chain, index: int, state: FloatArray) -> Pipe:
+    first = chain.place[index]
+    pipe = chain.pipes[index]
+    return _at(pipe, state[first : first + 4])
+
+
+def _at(pipe: Pipe, change: FloatArray) -> Pipe:
+    """Return a pipe of the same length on its axis after a change."""
+    middle, direction = tilted(pipe, change)
+    half = 0.5 * pipe.length * direction
+    return replace(pipe, start=middle - half, end=middle + half)
+
+
+def _between(chain: _Chain, index: int, moved: dict[int, Pipe], state: FloatArray) -> Pipe:
+    """Return a pipe with its ends where the arcs of a chain begin."""
+    pipe = moved[index]
+    for k, one in chain.elbows.items():
+        if index in one.joins:
+            which = one.joins.index(index)
+            bend = _bend(replace(one, bend_radius=float(state[chain.bends[k]])), moved)
+            pipe = pipe.with_end(_ends(one)[which], (bend.start, bend.end)[which])
+    return pipe
+
+
+def _settle(trace: Trace, near: Surroundings, chain: _Chain, state: FloatArray, covariance: FloatArray) -> None:
+    """Move the pipes and elbows of a chain to where its fit has them, unless elbows lose their points."""
+    radius = float(state[4 * len(chain.pipes)])
+    width = ON_SURFACE * chain.spread + 0.01 * radius
+    moved: dict[int, Pipe] = {}
+    for index, first in chain.place.items():
+        part = slice(first, first + 4)
+        pipe = _at(chain.pipes[index], state[part])
+        if index in chain.short:
+            known = pipe.covariance.copy()
+            known[:4, :4], known[:4, 4], known[4, :4] = covariance[part, part], 0.0, 0.0
+            pipe = replace(pipe, covariance=known)
+        moved[index] = pipe
+    bends = {k: _bend(replace(one, bend_radius=float(state[chain.bends[k]])), moved) for k, one in chain.elbows.items()}
+    for k, bend in bends.items():
+        along, distances = bend.coordinates(chain.arcs[k])
+        before, around = _bend(chain.elbows[k], chain.pipes).coordinates(chain.arcs[k])
+        now = (along > 0) & (along < bend.length) & (np.abs(distances - radius) < width)
+        then = (before > 0) & (before < chain.elbows[k].bend_radius * chain.elbows[k].angle)
+        then &= np.abs(around - chain.elbows[k].radius) < width
+        if now.sum() < LEAST_KEPT * then.sum() or bend.bend_radius > 14.0 * radius:
+            return
+    for index, pipe in moved.items():
+        trace.pipes[index] = pipe
+    for k, bend in bends.items():
+        one = chain.elbows[k]
+        for index, end, place in zip(one.joins, _ends(one), (bend.start, bend.end), strict=True):
+            trace.pipes[index] = trace.pipes[index].with_end(end, place)
+        trace.fittings[k] = replace(
+            one,
+            center=bend.center,
+            normal=bend.normal,
+            bend_radius=bend.bend_radius,
+            angle=bend.angle,
+            radius=radius,
+            start=bend.start,
+            end=bend.end,
+            std=_deviations(chain, k, state, covariance),
+        )
+
+
+def _deviations(chain: _Chain, k: int, state: FloatArray, covariance: FloatArray) -> dict[str, float]:
+    """Return the standard deviations of an elbow of a chain."""
+    one, place = chain.elbows[k], chain.bends[k]
+    first, second = (chain.pipes[index] for index in one.joins)
+    which = [slot for index in one.joins for slot in range(chain.place[index], chain.place[index] + 4)]
+    angle = bend_of(first, second, _ends(one), state[which], one.bend_radius)[0].angle
+    row = np.zeros(8)
+    for d in (2, 3, 6, 7):
+        shifted = state[which].copy()
+        shifted[d] += 1e-6
+        row[d] = (bend_of(first, second, _ends(one), shifted, one.bend_radius)[0].angle - angle) / 1e-6
+    tube = 4 * len(chain.pipes)
+    return {
+        "bend_radius": math.sqrt(max(float(covariance[place, place]), 0.0)),
+        "angle_deg": math.degrees(math.sqrt(max(float(row @ covariance[np.ix_(which, which)] @ row), 0.0))),
+        "radius": math.sqrt(max(float(covariance[tube, tube]), 0.0)),
+    }
