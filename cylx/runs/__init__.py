@@ -18,7 +18,7 @@ from cylx.runs.crossings import split_crossings
 from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
 from cylx.runs.onward import follow_ends
-from cylx.runs.parts import drop_parts
+from cylx.runs.parts import drop_parts, drop_twins
 from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.roughness import is_rough
@@ -71,7 +71,8 @@ def trace_runs(
     add_reducers(trace, near)
     for _ in range(ROUNDS):
         # straights that were found too long have bent with their fittings; those found along the runs are new
-        trace = Trace(trim(trace, near), near, others=others, followed=trace.followed)
+        trace = drop_twins(trace)
+        trace = Trace(trim(trace, near), near, others=trace.others, followed=trace.followed)
         add_bends(trace, near)
         add_reducers(trace, near)
         add_junctions(trace, near)

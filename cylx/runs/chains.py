@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.records import Elbow
-from cylx.runs.bend import Bend
+from cylx.runs.bend import LEAST_TURN, Bend
 from cylx.runs.bend_fit import SKEWED, axes_of, bend_of
 from cylx.runs.bend_normal import fill_bend_normal
 from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings, tilted
@@ -26,6 +26,8 @@ ABOUT = 0.6
 """Points within so many radii of the surface are looked at."""
 LEAST_KEPT = 0.9
 """A fit of all that leaves an elbow a smaller share of its points is none."""
+MOST_MOVED, MOST_TURNED = 3.0, math.radians(15.0)
+"""Nor is one that moves the ends of an elbow by so many radii, or turns it by so much."""
 MOST_POINTS = 1200
 """Of one elbow or pipe."""
 
@@ -94,9 +96,16 @@ def _is_short(pipe: Pipe) -> bool:
     return pipe.length < SHORT * pipe.radius
 
 
-def _bend(one: Elbow, pipes: dict[int, Pipe] | Sequence[Pipe]) -> Bend:
+def _bend(one: Elbow, pipes: Mapping[int, Pipe] | Sequence[Pipe]) -> Bend:
     ends = _ends(one)
     return bend_of(pipes[one.joins[0]], pipes[one.joins[1]], ends, np.zeros(8), one.bend_radius)[0]
+
+
+def _bends(chain: _Chain, pipes: Mapping[int, Pipe], state: FloatArray) -> dict[int, Bend]:
+    """Return the bends of a chain between pipes that moved."""
+    return {
+        k: _bend(replace(one, bend_radius=float(state[chain.bends[k]])), pipes) for k, one in chain.elbows.items()
+    }
 
 
 def _ends(one: Elbow) -> tuple[End, End]:
@@ -225,8 +234,11 @@ def _add_straights(chain: _Chain, state: FloatArray, width: float, normal: Float
     """Add what the points on the short pipes say: those between the arcs at both ends."""
     tube = 4 * len(chain.pipes)
     moved = {index: _moved(chain, index, state) for index in chain.pipes}
+    bends = _bends(chain, moved, state)
     for index, points in chain.straights.items():
-        pipe = _between(chain, index, moved, state)
+        pipe = _ended(chain, index, moved[index], {k: bends[k] for k in bends if index in chain.elbows[k].joins})
+        if float(pipe.direction @ moved[index].direction) < 0.0:
+            continue
         away = points - pipe.middle
         heights = away @ pipe.direction
         radial = away - heights[:, None] * pipe.direction
@@ -260,15 +272,22 @@ def _at(pipe: Pipe, change: FloatArray) -> Pipe:
     return replace(pipe, start=middle - half, end=middle + half)
 
 
-def _between(chain: _Chain, index: int, moved: dict[int, Pipe], state: FloatArray) -> Pipe:
+def _ended(chain: _Chain, index: int, pipe: Pipe, bends: Mapping[int, Bend]) -> Pipe:
     """Return a pipe with its ends where the arcs of a chain begin."""
-    pipe = moved[index]
-    for k, one in chain.elbows.items():
-        if index in one.joins:
-            which = one.joins.index(index)
-            bend = _bend(replace(one, bend_radius=float(state[chain.bends[k]])), moved)
-            pipe = pipe.with_end(_ends(one)[which], (bend.start, bend.end)[which])
+    for k, bend in bends.items():
+        joins = chain.elbows[k].joins
+        if index in joins:
+            which = joins.index(index)
+            pipe = pipe.with_end(_ends(chain.elbows[k])[which], (bend.start, bend.end)[which])
     return pipe
+
+
+def _is_near(chain: _Chain, k: int, bend: Bend) -> bool:
+    """Return whether a bend is about where it was before."""
+    one, most = chain.elbows[k], MOST_MOVED * chain.radius
+    turn = abs(bend.angle - one.angle)
+    moves = [float(np.linalg.norm(new - old)) for new, old in ((bend.start, one.start), (bend.end, one.end))]
+    return max(moves) < most and turn < MOST_TURNED and bend.angle > LEAST_TURN
 
 
 def _settle(trace: Trace, near: Surroundings, chain: _Chain, state: FloatArray, covariance: FloatArray) -> None:
@@ -284,21 +303,22 @@ def _settle(trace: Trace, near: Surroundings, chain: _Chain, state: FloatArray, 
             known[:4, :4], known[:4, 4], known[4, :4] = covariance[part, part], 0.0, 0.0
             pipe = replace(pipe, covariance=known)
         moved[index] = pipe
-    bends = {k: _bend(replace(one, bend_radius=float(state[chain.bends[k]])), moved) for k, one in chain.elbows.items()}
+    bends = _bends(chain, moved, state)
     for k, bend in bends.items():
         along, distances = bend.coordinates(chain.arcs[k])
         before, around = _bend(chain.elbows[k], chain.pipes).coordinates(chain.arcs[k])
         now = (along > 0) & (along < bend.length) & (np.abs(distances - radius) < width)
         then = (before > 0) & (before < chain.elbows[k].bend_radius * chain.elbows[k].angle)
         then &= np.abs(around - chain.elbows[k].radius) < width
-        if now.sum() < LEAST_KEPT * then.sum() or bend.bend_radius > 14.0 * radius:
+        if now.sum() < LEAST_KEPT * then.sum() or not _is_near(chain, k, bend):
             return
-    for index, pipe in moved.items():
+    ends = {index: _ended(chain, index, pipe, bends) for index, pipe in moved.items()}
+    if any(float(pipe.direction @ chain.pipes[index].direction) < 0.0 for index, pipe in ends.items()):
+        return
+    for index, pipe in ends.items():
         trace.pipes[index] = pipe
     for k, bend in bends.items():
         one = chain.elbows[k]
-        for index, end, place in zip(one.joins, _ends(one), (bend.start, bend.end), strict=True):
-            trace.pipes[index] = trace.pipes[index].with_end(end, place)
         trace.fittings[k] = replace(
             one,
             center=bend.center,
