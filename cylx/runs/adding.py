@@ -263,9 +263,15 @@ def _spread_of(points: FloatArray, start: FloatArray, axis: FloatArray, gap: flo
 
 
 def add_caps(trace: Trace, near: Surroundings) -> int:
-    """Add the caps of ends that nothing joins; return their number."""
+    """Add the caps of ends that nothing joins, of pipes that something else makes a piece of a run; return their number.
+
+    A disc at the end of a cylinder alone says that it is closed, as pins and bosses are, and not that it is a pipe.
+    """
     count = 0
+    joined = {index for fitting in trace.fittings for index in fitting.joins}
     for index, pipe in enumerate(trace.pipes):
+        if index not in joined:
+            continue
         for end in ENDS:
             if (index, end) in trace.closed:
                 continue
