@@ -11,9 +11,7 @@ from cylx.geometry.kernels import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def arc_place(
-    px: float, py: float, pz: float, frame: FloatArray, radius: float, angle: float
-) -> tuple[float, float]:
+def arc_place(px: float, py: float, pz: float, frame: FloatArray, radius: float, angle: float) -> tuple[float, float]:
     """Return how far along the centre line a point is, and how far from it; see `fill_arc_coordinates`."""
     half = 0.5 * angle
     p = (px, py, pz)

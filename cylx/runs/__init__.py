@@ -21,7 +21,7 @@ from cylx.runs.onward import follow_ends
 from cylx.runs.parts import drop_parts, drop_twins
 from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
-from cylx.runs.roughness import is_rough
+from cylx.runs.roughness import rough_ones
 from cylx.runs.tracing import Trace
 from cylx.runs.usual_bends import settle_radii
 
@@ -65,7 +65,7 @@ def trace_runs(
     near = Surroundings(points, labels, spacing, noise)
     pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
     pipes = split_crossings(settled(pipes, near), near)
-    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_other or is_rough(pipe, near))
+    others = rough_ones(pipes, near) | {k for k, pipe in enumerate(pipes) if pipe.is_other}
     trace = Trace(pipes, near, others=others)
     add_bends(trace, near)
     add_reducers(trace, near)

@@ -263,7 +263,7 @@ def _spread_of(points: FloatArray, start: FloatArray, axis: FloatArray, gap: flo
 
 
 def add_caps(trace: Trace, near: Surroundings) -> int:
-    """Add the caps of ends that nothing joins, of pipes that something else makes a piece of a run; return their number.
+    """Add the caps of ends that nothing joins, of pipes that something else joins to a run; return their number.
 
     A disc at the end of a cylinder alone says that it is closed, as pins and bosses are, and not that it is a pipe.
     """

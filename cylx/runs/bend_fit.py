@@ -50,6 +50,11 @@ def axes_of(one: Pipe, two: Pipe) -> FloatArray:
     return np.array([[pipe.middle, pipe.direction, *pipe.basis] for pipe in (one, two)])
 
 
+def signs_of(ends: tuple[End, End]) -> FloatArray:
+    """Return 1 for each of two pipes whose direction is that of the bend between these ends, else -1; shape (2,)."""
+    return np.array([1.0 if ends[0] == "end" else -1.0, 1.0 if ends[1] == "start" else -1.0])
+
+
 def refined(
     bend: Bend,
     one: Pipe,
@@ -92,7 +97,10 @@ def refined(
     base[8], base[9] = radius, bend.bend_radius
     state = base.copy()
     small = np.array([*[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2])
-    places, signs = axes_of(one, two), np.array([1.0 if ends[0] == "end" else -1.0, 1.0 if ends[1] == "start" else -1.0])
+    places, signs = (
+        axes_of(one, two),
+        np.array([1.0 if ends[0] == "end" else -1.0, 1.0 if ends[1] == "start" else -1.0]),
+    )
     # points of the straights are in their priors already
     reach = np.array([spread, ON_SURFACE * 1.5 * spread, *says, 2.0 * radius, LESSER, SKEWED * radius])
     points = np.ascontiguousarray(points)

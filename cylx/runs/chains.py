@@ -3,49 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from cylx.geometry.arrays import FloatArray, IndexArray
-from cylx.records import Elbow
+from cylx.geometry.arrays import FloatArray
 from cylx.runs.bend import LEAST_TURN, Bend
-from cylx.runs.bend_fit import SKEWED, axes_of, bend_of
+from cylx.runs.bend_fit import SKEWED, axes_of, bend_of, signs_of
 from cylx.runs.bend_normal import fill_bend_normal
-from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings, tilted
+from cylx.runs.chain_parts import Chain, bend_between, chains_of, ends_of, gathered
+from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings, tilted
 from cylx.runs.tracing import Trace
 
-SHORT = 6.0
-"""The axis of a pipe shorter than so many radii is told together with the elbows at its ends."""
 WIDE, STEPS = 1.8, 10
 """Points up to so many times their usual width have a say in the first steps of the fit; steps in all."""
 LOOSE_OFFSET, LOOSE_TILT = 1.0, 0.5
 """What is known of a short pipe without its points: standard deviations, in radii and radians."""
-ABOUT = 0.6
-"""Points within so many radii of the surface are looked at."""
 LEAST_KEPT = 0.9
 """A fit of all that leaves an elbow a smaller share of its points is none."""
 MOST_MOVED, MOST_TURNED = 3.0, math.radians(15.0)
 """Nor is one that moves the ends of an elbow by so many radii, or turns it by so much."""
-MOST_POINTS = 1200
-"""Of one elbow or pipe."""
-
-
-@dataclass(slots=True, eq=False)
-class _Chain:
-    """Pipes, and the elbows between them, with the points of each, and where each is in the vector of unknowns."""
-
-    pipes: dict[int, Pipe]
-    elbows: dict[int, Elbow]
-    short: frozenset[int]
-    arcs: dict[int, FloatArray]
-    straights: dict[int, FloatArray]
-    weights: dict[tuple[str, int], float]
-    radius: float
-    spread: float
-    place: dict[int, int]
-    bends: dict[int, int]
 
 
 def settle_chains(trace: Trace, near: Surroundings) -> None:
@@ -59,113 +37,22 @@ def settle_chains(trace: Trace, near: Surroundings) -> None:
     """
     if near.cells is None:
         return
-    for pipes, elbows in _chains(trace):
-        chain = _gathered(trace, near, pipes, elbows)
+    for pipes, elbows in chains_of(trace):
+        chain = gathered(trace, near, pipes, elbows)
         solved = _solved(chain)
         if solved is not None:
             _settle(trace, near, chain, *solved)
 
 
-def _chains(trace: Trace) -> list[tuple[list[int], list[int]]]:
-    """Return the pipes and the elbows of each chain: elbows that share a short pipe are of one."""
-    of_pipe: dict[int, list[int]] = {}
-    for k, one in enumerate(trace.fittings):
-        if isinstance(one, Elbow) and one.inliers > 0:
-            for index in one.joins:
-                of_pipe.setdefault(index, []).append(k)
-    out, seen = [], set[int]()
-    for index in sorted(of_pipe):
-        if index in seen or not _is_short(trace.pipes[index]):
-            continue
-        pipes, elbows, open_ones = {index}, set[int](), [index]
-        while open_ones:
-            here = open_ones.pop()
-            seen.add(here)
-            for k in of_pipe[here]:
-                elbows.add(k)
-                for other in trace.fittings[k].joins:
-                    if other not in pipes:
-                        pipes.add(other)
-                        if _is_short(trace.pipes[other]):
-                            open_ones.append(other)
-        out.append((sorted(pipes), sorted(elbows)))
-    return out
-
-
-def _is_short(pipe: Pipe) -> bool:
-    return pipe.length < SHORT * pipe.radius
-
-
-def _bend(one: Elbow, pipes: Mapping[int, Pipe] | Sequence[Pipe]) -> Bend:
-    ends = _ends(one)
-    return bend_of(pipes[one.joins[0]], pipes[one.joins[1]], ends, np.zeros(8), one.bend_radius)[0]
-
-
-def _bends(chain: _Chain, pipes: Mapping[int, Pipe], state: FloatArray) -> dict[int, Bend]:
+def _bends(chain: Chain, pipes: Mapping[int, Pipe], state: FloatArray) -> dict[int, Bend]:
     """Return the bends of a chain between pipes that moved."""
     return {
-        k: _bend(replace(one, bend_radius=float(state[chain.bends[k]])), pipes) for k, one in chain.elbows.items()
+        k: bend_between(replace(one, bend_radius=float(state[chain.bends[k]])), pipes)
+        for k, one in chain.elbows.items()
     }
 
 
-def _ends(one: Elbow) -> tuple[End, End]:
-    first, second = one.ends
-    assert first != "side"
-    assert second != "side"
-    return first, second
-
-
-def _about(bend: Bend, radius: float, near: Surroundings) -> IndexArray:
-    """Return all points about an arc."""
-    outer = (1.0 + ABOUT) * radius
-    low = max(0.0, bend.bend_radius - outer) if bend.angle < math.pi else 0.0
-    if bend.bend_radius < outer:
-        found = near.about(bend.meeting, bend.normal, -outer, outer, bend.tangent + 2.0 * outer)
-    else:
-        found = near.about(bend.center, bend.normal, -outer, outer, bend.bend_radius + outer, low)
-    along, distances = bend.coordinates(near.points[found])
-    on = (along > -0.5 * radius) & (along < bend.length + 0.5 * radius) & (np.abs(distances - radius) < ABOUT * radius)
-    return found[on]
-
-
-def _thinned(points: FloatArray) -> tuple[FloatArray, float]:
-    """Return no more than so many points, and how many each of them stands for."""
-    step = max(1, -(-len(points) // MOST_POINTS))
-    some = np.ascontiguousarray(points[::step])
-    return some, len(points) / max(len(some), 1)
-
-
-def _gathered(trace: Trace, near: Surroundings, pipes: list[int], elbows: list[int]) -> _Chain:
-    """Return a chain with its points: those of its own pipes and elbows, and those that are free."""
-    members = {index: trace.pipes[index] for index in pipes}
-    bends = {k: trace.fittings[k] for k in elbows}
-    short = frozenset(index for index in pipes if _is_short(trace.pipes[index]))
-    labels = [pipe.label for pipe in members.values()]
-    claimed = np.unique(np.concatenate([trace.points[k] for k in elbows]))
-    known = {k: one for k, one in bends.items() if isinstance(one, Elbow)}
-    sizes = [pipe.radius for index, pipe in members.items() if index not in short] or [
-        one.radius for one in known.values()
-    ]
-    chain = _Chain(
-        members, known, short, {}, {}, {}, float(np.mean(sizes)), max(p.spread for p in members.values()), {}, {}
-    )
-    for k, one in known.items():
-        found = _about(_bend(one, trace.pipes), one.radius, near)
-        own = near.free(found, labels) | np.isin(found, claimed)
-        chain.arcs[k], chain.weights["arc", k] = _thinned(near.points[found[own]])
-        chain.bends[k] = 4 * len(pipes) + 1 + len(chain.bends)
-    for number, index in enumerate(pipes):
-        chain.place[index] = 4 * number
-        if index in short:
-            pipe = members[index]
-            half, outer = 0.5 * pipe.length + 0.5 * pipe.radius, (1.0 + ABOUT) * pipe.radius
-            found = near.about(pipe.middle, pipe.direction, -half, half, outer, (1.0 - ABOUT) * pipe.radius)
-            own = near.free(found, labels) | np.isin(found, claimed)
-            chain.straights[index], chain.weights["pipe", index] = _thinned(near.points[found[own]])
-    return chain
-
-
-def _solved(chain: _Chain) -> tuple[FloatArray, FloatArray] | None:
+def _solved(chain: Chain) -> tuple[FloatArray, FloatArray] | None:
     """Return the unknowns of a chain after its fit, and their covariance; None if that fails."""
     count = 4 * len(chain.pipes) + 1 + len(chain.bends)
     tube, radius, spread = 4 * len(chain.pipes), chain.radius, chain.spread
@@ -211,7 +98,7 @@ def _solved(chain: _Chain) -> tuple[FloatArray, FloatArray] | None:
 
 
 def _add_arcs(
-    chain: _Chain, state: FloatArray, small: FloatArray, width: float, normal: FloatArray, gradient: FloatArray
+    chain: Chain, state: FloatArray, small: FloatArray, width: float, normal: FloatArray, gradient: FloatArray
 ) -> None:
     """Add what the points on the arcs say."""
     part, line = np.empty((10, 10)), np.empty(10)
@@ -220,8 +107,7 @@ def _add_arcs(
     for k, one in chain.elbows.items():
         first, second = (chain.place[index] for index in one.joins)
         which = np.array([*range(first, first + 4), *range(second, second + 4), tube, chain.bends[k]])
-        ends = _ends(one)
-        signs = np.array([1.0 if ends[0] == "end" else -1.0, 1.0 if ends[1] == "start" else -1.0])
+        signs = signs_of(ends_of(one))
         axes = axes_of(chain.pipes[one.joins[0]], chain.pipes[one.joins[1]])
         weight = chain.weights["arc", k]
         reach[6] = SKEWED * chain.radius * math.sqrt(weight)
@@ -230,7 +116,7 @@ def _add_arcs(
         gradient[which] += weight * line
 
 
-def _add_straights(chain: _Chain, state: FloatArray, width: float, normal: FloatArray, gradient: FloatArray) -> None:
+def _add_straights(chain: Chain, state: FloatArray, width: float, normal: FloatArray, gradient: FloatArray) -> None:
     """Add what the points on the short pipes say: those between the arcs at both ends."""
     tube = 4 * len(chain.pipes)
     moved = {index: _moved(chain, index, state) for index in chain.pipes}
@@ -259,7 +145,7 @@ def _add_straights(chain: _Chain, state: FloatArray, width: float, normal: Float
         gradient[which] += rows.T @ (weights * e)
 
 
-def _moved(chain: _Chain, index: int, state: FloatArray) -> Pipe:
+def _moved(chain: Chain, index: int, state: FloatArray) -> Pipe:
     first = chain.place[index]
     pipe = chain.pipes[index]
     return _at(pipe, state[first : first + 4])
@@ -272,17 +158,17 @@ def _at(pipe: Pipe, change: FloatArray) -> Pipe:
     return replace(pipe, start=middle - half, end=middle + half)
 
 
-def _ended(chain: _Chain, index: int, pipe: Pipe, bends: Mapping[int, Bend]) -> Pipe:
+def _ended(chain: Chain, index: int, pipe: Pipe, bends: Mapping[int, Bend]) -> Pipe:
     """Return a pipe with its ends where the arcs of a chain begin."""
     for k, bend in bends.items():
         joins = chain.elbows[k].joins
         if index in joins:
             which = joins.index(index)
-            pipe = pipe.with_end(_ends(chain.elbows[k])[which], (bend.start, bend.end)[which])
+            pipe = pipe.with_end(ends_of(chain.elbows[k])[which], (bend.start, bend.end)[which])
     return pipe
 
 
-def _is_near(chain: _Chain, k: int, bend: Bend) -> bool:
+def _is_near(chain: Chain, k: int, bend: Bend) -> bool:
     """Return whether a bend is about where it was before."""
     one, most = chain.elbows[k], MOST_MOVED * chain.radius
     turn = abs(bend.angle - one.angle)
@@ -290,7 +176,7 @@ def _is_near(chain: _Chain, k: int, bend: Bend) -> bool:
     return max(moves) < most and turn < MOST_TURNED and bend.angle > LEAST_TURN
 
 
-def _settle(trace: Trace, near: Surroundings, chain: _Chain, state: FloatArray, covariance: FloatArray) -> None:
+def _settle(trace: Trace, near: Surroundings, chain: Chain, state: FloatArray, covariance: FloatArray) -> None:
     """Move the pipes and elbows of a chain to where its fit has them, unless elbows lose their points."""
     radius = float(state[4 * len(chain.pipes)])
     width = ON_SURFACE * chain.spread + 0.01 * radius
@@ -306,7 +192,7 @@ def _settle(trace: Trace, near: Surroundings, chain: _Chain, state: FloatArray, 
     bends = _bends(chain, moved, state)
     for k, bend in bends.items():
         along, distances = bend.coordinates(chain.arcs[k])
-        before, around = _bend(chain.elbows[k], chain.pipes).coordinates(chain.arcs[k])
+        before, around = bend_between(chain.elbows[k], chain.pipes).coordinates(chain.arcs[k])
         now = (along > 0) & (along < bend.length) & (np.abs(distances - radius) < width)
         then = (before > 0) & (before < chain.elbows[k].bend_radius * chain.elbows[k].angle)
         then &= np.abs(around - chain.elbows[k].radius) < width
@@ -332,17 +218,17 @@ def _settle(trace: Trace, near: Surroundings, chain: _Chain, state: FloatArray, 
         )
 
 
-def _deviations(chain: _Chain, k: int, state: FloatArray, covariance: FloatArray) -> dict[str, float]:
+def _deviations(chain: Chain, k: int, state: FloatArray, covariance: FloatArray) -> dict[str, float]:
     """Return the standard deviations of an elbow of a chain."""
     one, place = chain.elbows[k], chain.bends[k]
     first, second = (chain.pipes[index] for index in one.joins)
     which = [slot for index in one.joins for slot in range(chain.place[index], chain.place[index] + 4)]
-    angle = bend_of(first, second, _ends(one), state[which], one.bend_radius)[0].angle
+    angle = bend_of(first, second, ends_of(one), state[which], one.bend_radius)[0].angle
     row = np.zeros(8)
     for d in (2, 3, 6, 7):
         shifted = state[which].copy()
         shifted[d] += 1e-6
-        row[d] = (bend_of(first, second, _ends(one), shifted, one.bend_radius)[0].angle - angle) / 1e-6
+        row[d] = (bend_of(first, second, ends_of(one), shifted, one.bend_radius)[0].angle - angle) / 1e-6
     tube = 4 * len(chain.pipes)
     return {
         "bend_radius": math.sqrt(max(float(covariance[place, place]), 0.0)),

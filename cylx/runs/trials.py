@@ -74,7 +74,7 @@ def fill_bend_scores(
     step: float,
     scores: FloatArray,
 ) -> None:
-    """Fill in the score of the best bend from an end for each direction and bend radius, where it begins, and its angle.
+    """Fill in the score of the best bend from an end for each direction and bend radius, its beginning and its angle.
 
     Parameters
     ----------

@@ -105,7 +105,12 @@ def nominal_of(elbows: Sequence[Elbow]) -> tuple[float, float]:
         likely = np.full(len(GRID), ANY * _any(measured, std, 1.0)[2])
         for times, share in MADE:
             spread = np.hypot(std, SAME_SD * times * GRID)
-            likely += AS_MADE * share * np.exp(-0.5 * ((measured - times * GRID) / spread) ** 2) / (math.sqrt(2.0 * math.pi) * spread)
+            likely += (
+                AS_MADE
+                * share
+                * np.exp(-0.5 * ((measured - times * GRID) / spread) ** 2)
+                / (math.sqrt(2.0 * math.pi) * spread)
+            )
         logs += np.log(likely)
     weights = np.exp(logs - logs.max())
     weights /= weights.sum()
@@ -116,9 +121,7 @@ def nominal_of(elbows: Sequence[Elbow]) -> tuple[float, float]:
 def _usual(one: Elbow, known: Sequence[Elbow], nominal: tuple[float, float]) -> list[Usual]:
     """Return the usual radii for an elbow, of which some of its size and the nominal diameter of that are known."""
     diameter, std = nominal
-    out = [
-        Usual(times * diameter * one.radius, times * std * one.radius, AS_MADE * share) for times, share in MADE
-    ]
+    out = [Usual(times * diameter * one.radius, times * std * one.radius, AS_MADE * share) for times, share in MADE]
     for other in known:
         sd = math.hypot(other.std["bend_radius"], SAME_SD * other.bend_radius)
         out.append(Usual(other.bend_radius, sd, OF_CLOUD / len(known)))
