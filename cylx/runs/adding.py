@@ -10,11 +10,12 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Cap, Cross, Fitting, Flange, Inline, Joint, Junction, Reducer
 from cylx.runs.caps import fit_cap
-from cylx.runs.collars import LONGEST_INLINE, Collar, collars_of
+from cylx.runs.collars import LONGEST_INLINE, collars_of
 from cylx.runs.crossings import equal_crossings
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
 from cylx.runs.pipes import ENDS, End, Surroundings, sectors_of
+from cylx.runs.rings import Collar
 from cylx.runs.saddles import saddle_of
 from cylx.runs.tracing import BY_AXES, Trace, trust
 

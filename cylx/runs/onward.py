@@ -170,10 +170,11 @@ def _starts(pipe: Pipe, place: FloatArray, axis: FloatArray, points: FloatArray,
     local = np.ascontiguousarray((points - place) @ np.stack([axis, first, second]).T)
     shell = max(SHELL * radius, 2.0 * ON_SURFACE * spread)
     ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * spread))
-    turns, sizes = np.arange(TURNS) * (2.0 * math.pi / TURNS), np.array(RADII) * radius
+    turns = np.array([k * (2.0 * math.pi / TURNS) for k in range(TURNS)])
+    sizes, befores = np.array([one * radius for one in RADII]), np.array([one * radius for one in BEFORE])
     scores, surface = np.empty((TURNS, len(RADII), 3)), np.array([radius, spread, shell, ratio])
     pieces, step = int(AHEAD / STEP), STEP * radius
-    fill_bend_scores(local, turns, sizes, np.array(BEFORE) * radius, surface, pieces, step, scores)
+    fill_bend_scores(local, turns, sizes, befores, surface, pieces, step, scores)
     found = [
         (float(score), float(turn), float(before), float(size), float(angle))
         for turn, row in zip(turns, scores, strict=True)
