@@ -13,14 +13,15 @@ from cylx.records import CylinderFit
 from cylx.runs.adding import add_caps, add_collars, add_gaps, add_junctions, add_reducers
 from cylx.runs.answer import Traced, answer_of, in_order
 from cylx.runs.assumed import add_assumed
+from cylx.runs.chains import settle_chains
 from cylx.runs.crossings import split_crossings
 from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
 from cylx.runs.onward import follow_ends
-from cylx.runs.parts import drop_parts
+from cylx.runs.parts import drop_parts, drop_twins
 from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
-from cylx.runs.roughness import is_rough
+from cylx.runs.roughness import rough_ones
 from cylx.runs.tracing import Trace
 from cylx.runs.usual_bends import settle_radii
 
@@ -64,13 +65,14 @@ def trace_runs(
     near = Surroundings(points, labels, spacing, noise)
     pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
     pipes = split_crossings(settled(pipes, near), near)
-    others = frozenset(k for k, pipe in enumerate(pipes) if pipe.is_other or is_rough(pipe, near))
+    others = rough_ones(pipes, near) | {k for k, pipe in enumerate(pipes) if pipe.is_other}
     trace = Trace(pipes, near, others=others)
     add_bends(trace, near)
     add_reducers(trace, near)
     for _ in range(ROUNDS):
         # straights that were found too long have bent with their fittings; those found along the runs are new
-        trace = Trace(trim(trace, near), near, others=others, followed=trace.followed)
+        trace = drop_twins(trace)
+        trace = Trace(trim(trace, near), near, others=trace.others, followed=trace.followed)
         add_bends(trace, near)
         add_reducers(trace, near)
         add_junctions(trace, near)
@@ -88,6 +90,7 @@ def trace_runs(
     add_bends(trace, near)
     add_reducers(trace, near)
     add_assumed(trace, near)
+    settle_chains(trace, near)
     settle_radii(trace)
     trace = in_order(trace)
     runs = find_runs(trace.pipes, trace.fittings, near, catalogue, names)

@@ -10,11 +10,12 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Cap, Cross, Fitting, Flange, Inline, Joint, Junction, Reducer
 from cylx.runs.caps import fit_cap
-from cylx.runs.collars import LONGEST_INLINE, Collar, collars_of
+from cylx.runs.collars import LONGEST_INLINE, collars_of
 from cylx.runs.crossings import equal_crossings
 from cylx.runs.facing import Facing, FittedCone, facing_ends, fit_reducer
 from cylx.runs.junctions import Branching, branchings
 from cylx.runs.pipes import ENDS, End, Surroundings, sectors_of
+from cylx.runs.rings import Collar
 from cylx.runs.saddles import saddle_of
 from cylx.runs.tracing import BY_AXES, Trace, trust
 
@@ -263,9 +264,15 @@ def _spread_of(points: FloatArray, start: FloatArray, axis: FloatArray, gap: flo
 
 
 def add_caps(trace: Trace, near: Surroundings) -> int:
-    """Add the caps of ends that nothing joins; return their number."""
+    """Add the caps of ends that nothing joins, of pipes that something else joins to a run; return their number.
+
+    A disc at the end of a cylinder alone says that it is closed, as pins and bosses are, and not that it is a pipe.
+    """
     count = 0
+    joined = {index for fitting in trace.fittings for index in fitting.joins}
     for index, pipe in enumerate(trace.pipes):
+        if index not in joined:
+            continue
         for end in ENDS:
             if (index, end) in trace.closed:
                 continue

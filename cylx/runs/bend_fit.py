@@ -8,10 +8,15 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.runs.bend import Bend
+from cylx.runs.bend_normal import fill_bend_normal
 from cylx.runs.pipes import ON_SURFACE, End, Pipe, tilted
 
 CLOSE = 10.0
 """The fit ends at steps shorter than so many of the small ones that derivatives are taken by."""
+SKEWED = 0.02
+"""Axes of one bend pass each other by about so many radii."""
+LESSER = 0.25
+"""Say of points just beside the arc."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +43,16 @@ def bend_of(
     foot = middle + (along - cosine * onto) / sine * direction
     skew = foot - (other + (cosine * along - onto) / sine * onward)
     return Bend(foot - 0.5 * skew, first, second, bend_radius), skew
+
+
+def axes_of(one: Pipe, two: Pipe) -> FloatArray:
+    """Return middle, direction and basis of two pipes, as the normal equations take them; shape (2, 4, 3)."""
+    return np.array([[pipe.middle, pipe.direction, *pipe.basis] for pipe in (one, two)])
+
+
+def signs_of(ends: tuple[End, End]) -> FloatArray:
+    """Return 1 for each of two pipes whose direction is that of the bend between these ends, else -1; shape (2,)."""
+    return np.array([1.0 if ends[0] == "end" else -1.0, 1.0 if ends[1] == "start" else -1.0])
 
 
 def refined(
@@ -82,31 +97,20 @@ def refined(
     base[8], base[9] = radius, bend.bend_radius
     state = base.copy()
     small = np.array([*[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2, *[1e-5] * 2, *[1e-4 * radius] * 2])
-    skewed = 0.02 * radius
-
-    def residuals(values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        shape, skew = bend_of(one, two, ends, values, max(float(values[9]), 0.0))
-        along, distances = shape.coordinates(points)
-        return along, distances - values[8], skew
-
+    places, signs = (
+        axes_of(one, two),
+        np.array([1.0 if ends[0] == "end" else -1.0, 1.0 if ends[1] == "start" else -1.0]),
+    )
+    # points of the straights are in their priors already
+    reach = np.array([spread, ON_SURFACE * 1.5 * spread, *says, 2.0 * radius, LESSER, SKEWED * radius])
+    points = np.ascontiguousarray(points)
+    normal, gradient = np.empty((10, 10)), np.empty(10)
     covariance = np.linalg.inv(information + np.diag([*[0.0] * 9, 1e-12 / radius**2]))
     for _ in range(steps):
-        along, errors, skew = residuals(state)
-        length = max(state[9], 0.0) * bend.angle
-        # points of the straights are in their priors already
-        beside = np.maximum(np.maximum(-along - says[0], along - length - says[1]), 0.0)
-        weights = np.maximum(1.0 - (errors / (ON_SURFACE * 1.5 * spread)) ** 2, 0.0) ** 2
-        weights *= np.where(beside > 2.0 * radius, 0.0, np.where(beside > 0.0, 0.25, 1.0)) / spread**2
-        jacobian, bending = np.empty((len(points), 10)), np.empty((3, 10))
-        for k in range(10):
-            moved = state.copy()
-            moved[k] += small[k]
-            _, shifted, skewing = residuals(moved)
-            jacobian[:, k], bending[:, k] = (shifted - errors) / small[k], (skewing - skew) / small[k]
-        normal = information + (jacobian * weights[:, None]).T @ jacobian + bending.T @ bending / skewed**2
+        fill_bend_normal(points, places, signs, state, small, reach, normal, gradient)
+        normal += information
         normal[9, 9] += 1e-9 / radius**2
-        gradient = information @ (state - base) + jacobian.T @ (weights * errors) + bending.T @ skew / skewed**2
-        gradient[9] -= information[9, 9] * (state[9] - base[9])
+        gradient += information @ (state - base)
         covariance = np.linalg.inv(normal)
         step = covariance @ gradient
         state = state - step

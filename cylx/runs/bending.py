@@ -14,6 +14,7 @@ from cylx.runs.bend_evidence import LEAST_INLIERS, WIDEST_BEND, FittedBend, judg
 from cylx.runs.bend_fit import refined
 from cylx.runs.meetings import Meeting
 from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings
+from cylx.runs.trials import fill_radius_costs
 
 MOST_POINTS = 900
 TRIED = 28
@@ -137,10 +138,8 @@ def _zone(bend: Bend, reach: float, most: float, radius: float, own: tuple[int, 
 
 def _costs(bend: Bend, radii: FloatArray, points: FloatArray, radius: float, spread: float) -> FloatArray:
     """Return how badly bends of several radii explain points that some of them explain."""
-    width = ON_SURFACE * spread
-    squares = np.empty((len(radii), len(points)))
-    for k, bend_radius in enumerate(radii):
-        _, distances = replace(bend, bend_radius=float(bend_radius)).coordinates(points)
-        squares[k] = np.minimum(((distances - radius) / width) ** 2, 1.0)
+    corner = np.stack([bend.meeting, bend.first, bend.second, bend.normal, bend.inward])
+    costs = np.empty(len(radii))
     # a larger bend is shorter, so that costs count all points that are on any of them
-    return np.asarray(squares[:, (squares < 1.0).any(axis=0)].sum(axis=1))
+    fill_radius_costs(points, corner, bend.angle, radii, radius, ON_SURFACE * spread, costs)
+    return costs

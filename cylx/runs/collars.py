@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
-from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
-from cylx.geometry.cylinder import axis_basis
+from cylx.geometry.arrays import MaskArray
 from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings
+from cylx.runs.rings import SECTORS, Collar, Ring, ring_about
 from cylx.runs.wider import LONGEST_RIM, NARROWEST, WIDEST, coaxial
 
-SECTORS = 16
 LEAST_SECTORS = 4
 """Sectors of a slice about the axis that must hold points of something that is short along it."""
 ABOVE = 2.5
@@ -25,7 +23,7 @@ LONGEST_FLANGE = 1.25
 THICKEST_PAIR, THICKEST_DISC = 0.9, 0.45
 """Thickness of a pair of flanges, and of one at the end of a pipe, in its radius: thicker discs are heads."""
 LEAST_PIPE = 2.5
-"""A pipe is at least so long, in the radius of its flange."""
+"""A pipe is at least so long for each of its flanges, in the radius of that."""
 LEAST_ON_FACE = 6
 """Points of a face that tell where it is; else those of the rim do."""
 LONGEST_INLINE = 6.0
@@ -34,57 +32,12 @@ LEAST_SIDES = 5
 """Sectors about the axis in which the rim of a flange must be seen, and its faces."""
 ALL_ROUND = 10
 """Sectors in which the rim must be seen if no face is."""
-ABOUT = 7.0
-"""Points up to so many radii of the pipe are looked at: a wall goes on beyond what a flange could be."""
 ROUND = 0.45
 """Share of the sectors that must have points at the rim."""
 MOST_WITHIN = 0.45
 """Points in the middle of the disc, between its faces, for each point on its surface."""
 MOST_BEYOND = 0.5
 """Points just beyond its rim, for each point on its surface."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Collar:
-    """Something about a pipe.
-
-    Parameters
-    ----------
-    kind : {'flange', 'inline'}
-    where : {'side', 'start', 'end'}
-        Whether the pipe goes on at both sides of it, or ends at it.
-    center : ndarray of shape (3,)
-    radius, thickness : float
-    pair : bool
-    indices : ndarray of shape (n,)
-    rms, coverage, confidence : float
-    std : dict of str to float
-    """
-
-    kind: Literal["flange", "inline"]
-    where: Literal["side", "start", "end"]
-    center: FloatArray
-    radius: float
-    thickness: float
-    pair: bool
-    indices: IndexArray
-    rms: float
-    coverage: float
-    confidence: float
-    std: dict[str, float]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Ring:
-    """The free points about a pipe: indices, heights from its start, distances from its axis, sectors."""
-
-    indices: IndexArray
-    heights: FloatArray
-    distances: FloatArray
-    sectors: IndexArray
-
-    def part(self, keep: MaskArray) -> _Ring:
-        return _Ring(self.indices[keep], self.heights[keep], self.distances[keep], self.sectors[keep])
 
 
 def collars_of(index: int, pipes: list[Pipe], near: Surroundings, shut: tuple[bool, bool]) -> list[Collar]:
@@ -103,7 +56,7 @@ def collars_of(index: int, pipes: list[Pipe], near: Surroundings, shut: tuple[bo
     others = coaxial(index, pipes)
     rims = [k for k in others if pipes[k].length < LONGEST_RIM * pipes[k].radius]
     covers = [pipes[k] for k in others if k not in rims]
-    ring = _ring(pipe, near, [pipes[k].label for k in rims], shut)
+    ring = ring_about(pipe, near, [pipes[k].label for k in rims], shut)
     if len(ring.indices) < LEAST_POINTS:
         return []
     flanges: list[Collar] = []
@@ -115,6 +68,9 @@ def collars_of(index: int, pipes: list[Pipe], near: Surroundings, shut: tuple[bo
             continue
         if all(abs(_height(found, pipe) - _height(one, pipe)) > 0.5 * one.thickness for one in flanges):
             flanges.append(found)
+    # what has more discs than there is room for on a pipe is a shaft with collars
+    if pipe.length < LEAST_PIPE * sum(one.radius for one in flanges):
+        return []
     flanges.sort(key=lambda one: _height(one, pipe))
     return _with_inlines(flanges, ring, pipe, near)
 
@@ -123,7 +79,7 @@ def _height(collar: Collar, pipe: Pipe) -> float:
     return float((collar.center - pipe.start) @ pipe.direction)
 
 
-def _with_inlines(flanges: list[Collar], ring: _Ring, pipe: Pipe, near: Surroundings) -> list[Collar]:
+def _with_inlines(flanges: list[Collar], ring: Ring, pipe: Pipe, near: Surroundings) -> list[Collar]:
     """Return flanges, and what is between two of them where the pipe is not seen; what is about that is no flange."""
     inlines: list[Collar] = []
     k = 0
@@ -139,20 +95,7 @@ def _with_inlines(flanges: list[Collar], ring: _Ring, pipe: Pipe, near: Surround
     return [*inlines, *flanges]
 
 
-def _ring(pipe: Pipe, near: Surroundings, rims: list[int], shut: tuple[bool, bool]) -> _Ring:
-    low = 0.0 if shut[0] else -1.5 * pipe.radius
-    high = pipe.length + (0.0 if shut[1] else 1.5 * pipe.radius)
-    inner = NARROWEST * pipe.radius + ON_SURFACE * pipe.spread
-    indices = near.about(pipe.start, pipe.direction, low, high, ABOUT * pipe.radius, inner)
-    indices = indices[near.free(indices, rims)]
-    away = near.points[indices] - pipe.start
-    first, second = axis_basis(pipe.direction)
-    x, y = away @ first, away @ second
-    sectors = np.floor((np.arctan2(y, x) / (2 * math.pi) + 0.5) * SECTORS).astype(np.int64) % SECTORS
-    return _Ring(indices, away @ pipe.direction, np.hypot(x, y), sectors)
-
-
-def _short_things(ring: _Ring, pipe: Pipe, near: Surroundings) -> list[tuple[float, float]]:
+def _short_things(ring: Ring, pipe: Pipe, near: Surroundings) -> list[tuple[float, float]]:
     """Return where along the axis there is more about the pipe than usual, on several sides of it."""
     width = max(0.7 * near.spacing, 2.0 * pipe.spread, 0.08 * pipe.radius)
     low = float(ring.heights.min())
@@ -178,7 +121,7 @@ def _short_things(ring: _Ring, pipe: Pipe, near: Surroundings) -> list[tuple[flo
     return out
 
 
-def _rim_of(own: _Ring, pipe: Pipe) -> float:
+def _rim_of(own: Ring, pipe: Pipe) -> float:
     """Return the radius at which the points stop: most lie there, few beyond."""
     width = 2.5 * pipe.spread
     grid = np.arange(NARROWEST * pipe.radius + width, float(own.distances.max()) + pipe.spread, 0.5 * pipe.spread)
@@ -193,7 +136,7 @@ def _rim_of(own: _Ring, pipe: Pipe) -> float:
 
 
 def _flange(
-    ring: _Ring, seed: tuple[float, float], pipe: Pipe, near: Surroundings, shut: tuple[bool, bool]
+    ring: Ring, seed: tuple[float, float], pipe: Pipe, near: Surroundings, shut: tuple[bool, bool]
 ) -> Collar | None:
     """Return the flange of which a short piece was seen; None if it is none."""
     margin = ON_SURFACE * pipe.spread
@@ -223,7 +166,7 @@ def _flange(
 
 
 def _judged(
-    solid: _Ring, ring: _Ring, pipe: Pipe, radius: float, ends: tuple[float, float], shut: tuple[bool, bool]
+    solid: Ring, ring: Ring, pipe: Pipe, radius: float, ends: tuple[float, float], shut: tuple[bool, bool]
 ) -> Collar | None:
     """Return a flange with its evidence; None if the points do not show it."""
     margin, (low, high) = ON_SURFACE * pipe.spread, ends
@@ -279,7 +222,7 @@ def _judged(
     )
 
 
-def _ends_of(solid: _Ring, of_face: MaskArray, spread: float) -> tuple[float, float]:
+def _ends_of(solid: Ring, of_face: MaskArray, spread: float) -> tuple[float, float]:
     """Return where a flange begins and ends along the axis: at its faces, where they are seen, or those of its rim."""
     heights, out = solid.heights, []
     for share in (0.03, 0.97):
@@ -293,7 +236,7 @@ def _ends_of(solid: _Ring, of_face: MaskArray, spread: float) -> tuple[float, fl
     return out[0], out[1]
 
 
-def _inline(first: Collar, second: Collar, ring: _Ring, pipe: Pipe, near: Surroundings) -> Collar | None:
+def _inline(first: Collar, second: Collar, ring: Ring, pipe: Pipe, near: Surroundings) -> Collar | None:
     """Return what is between two flanges, if it is about the pipe and hides it; None if there is only the pipe."""
     low, high = _height(first, pipe) + 0.5 * first.thickness, _height(second, pipe) - 0.5 * second.thickness
     radius = max(first.radius, second.radius)

@@ -21,6 +21,7 @@ SHORT, LOOSE_OFFSET, LOOSE_TILT = 4.0, 0.1, 0.05
 """The axis of a pipe shorter than so many radii is taken for uncertain by so many radii, and radians."""
 AGAIN = 0.2
 """A pipe that lost so many radii of its length to fittings is fitted again without what it lost."""
+OTHER_END: dict[End, End] = {"start": "end", "end": "start"}
 BETTER = 0.8
 """An axis moves with a fit that leaves it less than this share of its deviations."""
 
@@ -34,14 +35,25 @@ def add_bends(trace: Trace, near: Surroundings, only: frozenset[int] | None = No
             gap = gap_before(fitted, trace.pipes) / fitted.radius
             tried.append(((gap > NEARBY, -fitted.lengthwise, -len(fitted.indices), meeting.pipes), meeting, fitted))
     accepted: list[tuple[Meeting, FittedBend]] = []
-    ends: set[tuple[int, End]] = set()
+    lost: dict[tuple[int, End], float] = {}
     for _, meeting, fitted in sorted(tried, key=lambda one: one[0]):
-        keys = set(zip(fitted.pipes, fitted.ends, strict=True))
-        if not keys & ends:
-            ends |= keys
+        losses = _losses(fitted, trace.pipes)
+        # what both its ends lose cannot be more than there is of a pipe
+        left = (trace.pipes[i].length - loss - lost.get((i, OTHER_END[end]), 0.0) for (i, end), loss in losses.items())
+        if not losses.keys() & lost.keys() and min(left) > 0.0:
+            lost.update(losses)
             accepted.append((meeting, fitted))
     add_fitted(trace, _together(accepted, trace.pipes, near))
     return len(accepted)
+
+
+def _losses(one: FittedBend, pipes: list[Pipe]) -> dict[tuple[int, End], float]:
+    """Return by how much each of two pipes is shorter with a bend between them: less than 0 if it gets longer."""
+    places = one.bend.start, one.bend.end
+    return {
+        (i, end): float((pipes[i].at(end) - place) @ pipes[i].outward(end))
+        for i, end, place in zip(one.pipes, one.ends, places, strict=True)
+    }
 
 
 def add_fitted(trace: Trace, found: list[FittedBend]) -> None:

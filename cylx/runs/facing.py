@@ -12,6 +12,7 @@ from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import axis_basis
 from cylx.runs.bend import LEAST_TURN
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, sectors_of
+from cylx.runs.trials import fill_cone_costs
 
 LONGEST_REDUCER = 8.0
 """Distance of the ends, in the larger radius."""
@@ -169,6 +170,15 @@ class _Cone:
         along = float((place - self.two.middle) @ onward)
         return self.origin + low * self.axis, self.two.middle + along * onward
 
+    def local(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return points in a basis of the first axis, and the second axis in it, as `fill_cone_costs` takes them."""
+        basis = np.stack([self.axis, *axis_basis(self.axis)])
+        onward = -self.two.outward(self.facing.ends[1])
+        middle, way = basis @ (self.two.middle - self.origin), basis @ onward
+        back = float((self.origin - self.two.middle) @ onward)
+        second = np.array([middle[1], middle[2], back, way[0], way[1], way[2]])
+        return np.ascontiguousarray((points - self.origin) @ basis.T), second
+
     def errors(self, points: FloatArray, heights: FloatArray, low: float, high: float) -> FloatArray:
         """Return the signed distances of points from pipe, cone and pipe."""
         start, end = self.ends(low, high)
@@ -190,7 +200,7 @@ def _search(
     shape: _Cone, points: FloatArray, low: float, high: float, spread: float, step: float | None = None
 ) -> tuple[float, float]:
     """Return the ends of the best cone: between two heights, or about two ends."""
-    heights = (points - shape.origin) @ shape.axis
+    local, second = shape.local(points)
     change = abs(shape.two.radius - shape.one.radius)
     if step is None:
         grid = np.linspace(low, high, STEPS)
@@ -198,8 +208,8 @@ def _search(
     else:
         grid = np.linspace(-step, step, 7)
         tried = [(low + float(a), high + float(b)) for a in grid for b in grid if high + b - low - a > 0.1 * change]
-    width = ON_SURFACE * spread
-    costs = [float(np.minimum((shape.errors(points, heights, *one) / width) ** 2, 1.0).sum()) for one in tried]
+    costs, radii = np.empty(len(tried)), np.array([shape.one.radius, shape.two.radius])
+    fill_cone_costs(local, np.array(tried), radii, second, ON_SURFACE * spread, costs)
     return tried[int(np.argmin(costs))]
 
 

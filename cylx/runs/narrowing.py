@@ -13,6 +13,7 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import axis_basis
 from cylx.runs.pipes import ON_SURFACE, End, Pipe, Surroundings, turned
 from cylx.runs.refitting import is_borne_out, refit
+from cylx.runs.trials import fill_reducer_scores
 
 RATIOS = (0.45, 0.55, 0.65, 0.73, 0.8, 0.87, 1.15, 1.25, 1.37, 1.53, 1.8, 2.2)
 """Radii of the pipe behind the reducer that are tried, in those of the pipe before it."""
@@ -102,28 +103,24 @@ def _best(
     plain = np.cumsum(np.bincount(rows, weights=gains(np.hypot(a, b) - radius), minlength=count))
     alone = float(plain.max(initial=0.0))
 
+    local, surface = np.column_stack([x, a, b]), np.array([radius, spread, shell, ratio])
+
     def tried(ratios: Sequence[float], lengths: Sequence[float], befores: Sequence[float], sides: int) -> list[_Tried]:
-        out = []
-        for times in ratios:
-            other = times * radius
-            offset = abs(other - radius)
-            angles = np.arange(sides) * (2.0 * math.pi / sides)
-            shifts = [(0.0, 0.0), *((offset * math.cos(t), offset * math.sin(t)) for t in angles)]
-            for long in lengths:
-                length = long * max(radius, other)
-                for before in befores:
-                    if before * radius < back:
-                        continue
-                    share = np.clip((x - before * radius) / length, 0.0, 1.0)
-                    radii = radius + share * (other - radius)
-                    for shift in shifts:
-                        errors = np.hypot(a - share * shift[0], b - share * shift[1]) - radii
-                        total = np.cumsum(np.bincount(rows, weights=gains(errors), minlength=count))
-                        last = int(total.argmax())
-                        begin, end = before * radius + length, back + (last + 1) * step
-                        if end - begin >= LEAST_LENGTH * other:
-                            out.append(_Tried(float(total[last]), times, begin, end, other, shift))
-        return out
+        rows = [
+            (times, before * radius, long * max(radius, times * radius), times * radius, *shift)
+            for times in ratios
+            for long in lengths
+            for before in befores
+            if before * radius >= back
+            for shift in _shifts(abs(times - 1.0) * radius, sides)
+        ]
+        scores = np.empty((len(rows), 2))
+        fill_reducer_scores(local, np.array(rows).reshape(-1, 6)[:, 1:], surface, back, step, scores)
+        return [
+            _Tried(score, times, begin + length, stop, other, (first, second))
+            for (times, begin, length, other, first, second), (score, stop) in zip(rows, scores.tolist(), strict=True)
+            if stop - begin - length >= LEAST_LENGTH * other
+        ]
 
     first = max(tried(RATIOS, LENGTHS[1::2], BEFORE[::2], 4), default=None)
     if first is None or (first.score - alone) * weight < 0.3 * LEAST_SCORE:
@@ -134,3 +131,9 @@ def _best(
         return None
     behind = plain[min(max(int(-back / step) - 1, 0), len(plain) - 1)] if back < 0 else 0.0
     return best.begin, best.end, best.radius, best.shift, (best.score - float(behind)) * weight
+
+
+def _shifts(offset: float, sides: int) -> list[tuple[float, float]]:
+    """Return how far a reducer may shift across its axis: not at all, or to one of several sides."""
+    angles = np.arange(sides) * (2.0 * math.pi / sides)
+    return [(0.0, 0.0), *((offset * math.cos(t), offset * math.sin(t)) for t in angles)]

@@ -16,6 +16,7 @@ from cylx.runs.elbows import add_bends, add_fitted
 from cylx.runs.narrowing import narrowed
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
 from cylx.runs.tracing import Trace
+from cylx.runs.trials import fill_bend_scores
 
 AHEAD = 14.0
 """How far ahead is looked, in radii."""
@@ -166,35 +167,26 @@ def _starts(pipe: Pipe, place: FloatArray, axis: FloatArray, points: FloatArray,
     """Return the best of many bends that begin at an end of a pipe."""
     radius, spread = pipe.radius, pipe.spread
     first, second = axis_basis(axis)
-    away = points - place
-    x, a, b = away @ axis, away @ first, away @ second
+    local = np.ascontiguousarray((points - place) @ np.stack([axis, first, second]).T)
     shell = max(SHELL * radius, 2.0 * ON_SURFACE * spread)
     ratio = math.log(2.0 * shell / (math.sqrt(2.0 * math.pi) * spread))
-    pieces = int(AHEAD / STEP)
-    found: list[tuple[float, float, float, float, float]] = []
-    for turn in np.arange(TURNS) * (2.0 * math.pi / TURNS):
-        inward, across = math.cos(turn) * a + math.sin(turn) * b, math.cos(turn) * b - math.sin(turn) * a
-        for bend_radius in RADII:
-            size, best = bend_radius * radius, (-math.inf, 0.0, 0.0)
-            for before in BEFORE:
-                ahead = x - before * radius
-                y = size - inward
-                along = size * np.arctan2(ahead, y)
-                errors = np.abs(np.hypot(np.hypot(ahead, y) - size, across) - radius)
-                counted = (errors < shell) & (along > 0.0) & (along < 2.2 * size)
-                gain = np.maximum(ratio - 0.5 * (errors[counted] / spread) ** 2, -ratio)
-                rows = np.minimum((along[counted] / (STEP * radius)).astype(np.int64), pieces - 1)
-                total = np.cumsum(np.bincount(rows, weights=gain, minlength=pieces))
-                most = int(total.argmax())
-                best = max(best, (float(total[most]), before, (most + 1) * STEP * radius / size))
-            found.append((best[0], float(turn), best[1], size, best[2]))
+    turns = np.array([k * (2.0 * math.pi / TURNS) for k in range(TURNS)])
+    sizes, befores = np.array([one * radius for one in RADII]), np.array([one * radius for one in BEFORE])
+    scores, surface = np.empty((TURNS, len(RADII), 3)), np.array([radius, spread, shell, ratio])
+    pieces, step = int(AHEAD / STEP), STEP * radius
+    fill_bend_scores(local, turns, sizes, befores, surface, pieces, step, scores)
+    found = [
+        (float(score), float(turn), float(before), float(size), float(angle))
+        for turn, row in zip(turns, scores, strict=True)
+        for size, (score, before, angle) in zip(sizes, row, strict=True)
+    ]
     found.sort(reverse=True)
     tried: list[tuple[float, float, float, Bend]] = []
     for score, turn, before, size, angle in found[:FIRST]:
         if score * weight < LEAST_SCORE:
             break
         inward = math.cos(turn) * first + math.sin(turn) * second
-        start = place + before * radius * axis
+        start = place + before * axis
         angles = np.concatenate([np.linspace(0.35, 1.15, 9) * angle, [math.pi / 4.0, math.pi / 2.0]])
         best_of: tuple[float, float, float, Bend] | None = None
         for some in angles[(angles >= LEAST_TURN) & (angles <= 0.9 * math.pi)]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray
 from cylx.records import Elbow, Flange, Inline, Junction
+from cylx.runs.pieces import is_twin
 from cylx.runs.pipes import ENDS, Pipe
 from cylx.runs.tracing import Trace
 from cylx.runs.wider import LONGEST_RIM
@@ -41,13 +42,35 @@ def drop_parts(trace: Trace) -> Trace:
         if isinstance(fitting, Elbow) and fitting.bend_radius > 0:
             parts |= {k for k, pipe in enumerate(trace.pipes) if k not in joined and _is_within(pipe, fitting)}
     parts |= {k for k in range(len(trace.pipes)) if _is_remnant(k, trace, k not in joined)}
+    return _without(trace, parts)
+
+
+def drop_twins(trace: Trace) -> Trace:
+    """Return what was traced without pipes, found along a run, that are where another one of the same size is."""
+    pipes, twins = trace.pipes, set[int]()
+    for k, pipe in enumerate(pipes):
+        if pipe.source is None:
+            rivals = (j for j, other in enumerate(pipes) if j != k and j not in twins and _is_first(other, j, pipe, k))
+            if any(is_twin(pipe, pipes[j]) for j in rivals):
+                twins.add(k)
+    return _without(trace, twins) if twins else trace
+
+
+def _is_first(one: Pipe, number: int, other: Pipe, index: int) -> bool:
+    """Return whether of two pipes in one place the first is to be kept: one that was a cylinder, or the longer one."""
+    return (one.source is not None, one.length, -number) > (other.source is not None, other.length, -index)
+
+
+def _without(trace: Trace, parts: set[int]) -> Trace:
+    """Return what was traced without some of its pipes, and the fittings that they had."""
     kept = [k for k in range(len(trace.pipes)) if k not in parts]
     number = {old: new for new, old in enumerate(kept)}
     near = trace.near
     for k in parts:
         near.label(np.flatnonzero(near.labels == trace.pipes[k].label), -1)
     others = frozenset(number[k] for k in trace.others if k in number)
-    out = Trace([trace.pipes[k] for k in kept], near, others=others, followed=set())
+    followed = {(number[k], end) for k, end in trace.followed if k in number}
+    out = Trace([trace.pipes[k] for k in kept], near, others=others, followed=followed)
     for fitting, points in zip(trace.fittings, trace.points, strict=True):
         if parts.intersection(fitting.joins):
             near.label(points, -1)
@@ -57,6 +80,7 @@ def drop_parts(trace: Trace) -> Trace:
             main, branches = (tuple(number[k] for k in group) for group in (moved.main, moved.branches))
             moved = replace(moved, main=main, branches=branches)
         out.add(moved, points)
+    out.starts = [trace.starts[k] for k in kept if k < len(trace.starts)]
     return out
 
 

@@ -107,7 +107,7 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
     best = _sure(pipe, points, own, foreign, near.noise)
     two = changed(best, own) if depth > 0 and is_unsure(pipe) else None
     if two is not None:
-        new = [side for side in two if not any(_is_twin(side, other) for other in others)]
+        new = [side for side in two if not any(is_twin(side, other) for other in others)]
         return [piece for side in new for piece in _pieces(side, near, others, depth - 1)]
     for _ in range(3):
         low, high, _ = stretch(best, points, foreign)
@@ -128,7 +128,7 @@ def _pieces(pipe: Pipe, near: Surroundings, others: Sequence[Pipe], depth: int) 
     return [best, *_rest(pipe, best, near, others, depth)]
 
 
-def _is_twin(pipe: Pipe, other: Pipe) -> bool:
+def is_twin(pipe: Pipe, other: Pipe) -> bool:
     """Return whether most of a pipe is on another one of the same axis and radius."""
     if abs(float(pipe.direction @ other.direction)) < PARALLEL or differs(pipe, other):
         return False

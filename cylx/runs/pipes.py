@@ -50,6 +50,8 @@ class Pipe:
         Whether it is no pipe: its surface is seen from inside, or it winds.
     length : float
         Length of its axis.
+    middle : ndarray of shape (3,)
+        Middle of its axis.
     direction : ndarray of shape (3,)
         Unit direction from start to end.
     basis : pair of ndarray of shape (3,)
@@ -65,6 +67,7 @@ class Pipe:
     source: int | None = None
     is_other: bool = False
     length: float = field(init=False)
+    middle: FloatArray = field(init=False)
     direction: FloatArray = field(init=False)
     basis: tuple[FloatArray, FloatArray] = field(init=False)
 
@@ -72,6 +75,7 @@ class Pipe:
         along = self.end - self.start
         length = math.sqrt(float(along @ along))
         object.__setattr__(self, "length", length)
+        object.__setattr__(self, "middle", 0.5 * (self.start + self.end))
         direction = along / max(length, 1e-300)
         object.__setattr__(self, "direction", direction)
         object.__setattr__(self, "basis", axis_basis(direction))
@@ -94,11 +98,6 @@ class Pipe:
             index,
             fit.side == "concave",
         )
-
-    @property
-    def middle(self) -> FloatArray:
-        """Middle of its axis."""
-        return 0.5 * (self.start + self.end)
 
     def at(self, end: End) -> FloatArray:
         """Return the place of an end."""

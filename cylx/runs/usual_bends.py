@@ -17,6 +17,8 @@ MADE = ((1.0, 0.25), (1.5, 0.45), (2.0, 0.05), (3.0, 0.15), (5.0, 0.1))
 """Bend radii that elbows and bends are made with, in nominal diameters, and how usual each is."""
 DIAMETER, DIAMETER_SD = 1.75, 0.05
 """A nominal diameter in radii of the pipe (EN 10220: 1.66 to 1.85 from DN 40 to DN 300), and how far sizes differ."""
+GRID = np.linspace(1.0 - 3.0 * DIAMETER_SD, 1.0 + 3.0 * DIAMETER_SD, 61) * DIAMETER
+"""Nominal diameters of a size, in radii of its pipe, of which its elbows tell how likely each is."""
 SURE, SAME_SD = 0.025, 0.01
 """Elbows whose radius is known so well, in itself, tell those of others of their size; how far these differ."""
 SAME_SIZE = 0.04
@@ -49,7 +51,9 @@ def settle_radii(trace: Trace) -> None:
     elbows = {k: one for k, one in enumerate(trace.fittings) if isinstance(one, Elbow) and _is_open(one)}
     known = [one for one in elbows.values() if one.std["bend_radius"] < SURE * one.bend_radius]
     for k, one in elbows.items():
-        radius, std = posterior(one.bend_radius, one.std["bend_radius"], one.radius, _usual(one, known))
+        alike = [other for other in elbows.values() if other is not one and _is_alike(one, other)]
+        usual = _usual(one, [other for other in known if other in alike], nominal_of(alike))
+        radius, std = posterior(one.bend_radius, one.std["bend_radius"], one.radius, usual)
         first, second = (trace.pipes[i] for i in one.joins)
         ends = one.ends
         assert ends[0] != "side"
@@ -76,21 +80,66 @@ def settle_radii(trace: Trace) -> None:
 
 
 def _is_open(one: Elbow) -> bool:
-    """Return whether points tell an elbow, of which more or less is known."""
-    return one.inliers > 0 and one.bend_radius > 0 and one.std.get("bend_radius", 0.0) > 0
+    """Return whether points tell an elbow, of which more or less is known: also one that has hardly any radius."""
+    return one.inliers > 0 and one.std.get("bend_radius", 0.0) > 0
 
 
-def _usual(one: Elbow, known: Sequence[Elbow]) -> list[Usual]:
-    """Return the usual radii for an elbow."""
-    out = [
-        Usual(times * DIAMETER * one.radius, times * DIAMETER_SD * DIAMETER * one.radius, AS_MADE * share)
-        for times, share in MADE
-    ]
-    alike = [other for other in known if other is not one and abs(other.radius - one.radius) < SAME_SIZE * one.radius]
-    for other in alike:
+def _is_alike(one: Elbow, other: Elbow) -> bool:
+    """Return whether two elbows are of pipes of one size."""
+    return abs(other.radius - one.radius) < SAME_SIZE * one.radius
+
+
+def nominal_of(elbows: Sequence[Elbow]) -> tuple[float, float]:
+    """Return the nominal diameter of a size, in radii of its pipe, and its standard deviation.
+
+    All elbows of a size have bend radii that are usual multiples of one diameter: those that are known well tell it.
+
+    Parameters
+    ----------
+    elbows : sequence of Elbow
+        Of one size; none leave what is known of all sizes.
+    """
+    logs = -0.5 * ((GRID / DIAMETER - 1.0) / DIAMETER_SD) ** 2
+    for one in elbows:
+        measured, std = one.bend_radius / one.radius, one.std["bend_radius"] / one.radius
+        likely = np.full(len(GRID), ANY * _any(measured, std, 1.0)[2])
+        for times, share in MADE:
+            spread = np.hypot(std, SAME_SD * times * GRID)
+            likely += (
+                AS_MADE
+                * share
+                * np.exp(-0.5 * ((measured - times * GRID) / spread) ** 2)
+                / (math.sqrt(2.0 * math.pi) * spread)
+            )
+        logs += np.log(likely)
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    mean = float(weights @ GRID)
+    return mean, math.sqrt(float(weights @ (GRID - mean) ** 2) + (SAME_SD * mean) ** 2)
+
+
+def _usual(one: Elbow, known: Sequence[Elbow], nominal: tuple[float, float]) -> list[Usual]:
+    """Return the usual radii for an elbow, of which some of its size and the nominal diameter of that are known."""
+    diameter, std = nominal
+    out = [Usual(times * diameter * one.radius, times * std * one.radius, AS_MADE * share) for times, share in MADE]
+    for other in known:
         sd = math.hypot(other.std["bend_radius"], SAME_SD * other.bend_radius)
-        out.append(Usual(other.bend_radius, sd, OF_CLOUD / len(alike)))
+        out.append(Usual(other.bend_radius, sd, OF_CLOUD / len(known)))
     return out
+
+
+def _any(measured: float, std: float, tube: float) -> tuple[float, float, float]:
+    """Return mean, standard deviation and density of a measured bend radius, if any radius is as usual as another."""
+    span = math.log(WIDEST / SHARPEST)
+    low, high = max(SHARPEST * tube, measured - 6.0 * std), min(WIDEST * tube, measured + 6.0 * std)
+    if high <= low:  # a mitre, or a pipe that was bent
+        return measured, std, 1.0 / (span * min(max(measured, SHARPEST * tube), WIDEST * tube))
+    grid = np.geomspace(low, high, 65)
+    likely = np.exp(-0.5 * ((measured - grid) / std) ** 2)
+    mean = float((likely * grid).sum() / likely.sum())
+    sd = math.sqrt(float((likely * (grid - mean) ** 2).sum() / likely.sum()))
+    density = float(likely.mean()) * math.log(high / low) / (span * std * math.sqrt(2.0 * math.pi))
+    return mean, sd, density
 
 
 def posterior(measured: float, std: float, tube: float, usual: Sequence[Usual]) -> tuple[float, float]:
@@ -110,8 +159,8 @@ def posterior(measured: float, std: float, tube: float, usual: Sequence[Usual]) 
     radius, std : float
         Those of the most probable kind of radius; the deviation is about it, of all kinds together.
     """
-    at = min(max(measured, SHARPEST * tube), WIDEST * tube)
-    kinds = [(measured, std, ANY / (at * math.log(WIDEST / SHARPEST)))]
+    mean, sd, density = _any(measured, std, tube)
+    kinds = [(mean, sd, ANY * density)]
     for one in usual:
         spread = math.hypot(std, one.std)
         density = math.exp(-0.5 * ((measured - one.radius) / spread) ** 2) / (math.sqrt(2.0 * math.pi) * spread)

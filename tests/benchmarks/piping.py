@@ -1,5 +1,6 @@
 """Runs of pipe: how well straights, fittings and runs are found in synthetic plants of three sizes, and that none is
-invented where there are none. Extracted in this process, with defaults.
+invented where there are none. Extracted in this process, with defaults; seconds are those of
+all its threads together.
 
 The plants are those of `cylx synth piping`, seen from four places. Scenes without pipes are synthetic rooms, and, where
 they are there, CAD parts and trees of `../shared/data`.
@@ -36,11 +37,11 @@ def plants(runs, seeds):
     seconds = np.zeros(2)
     for seed in seeds:
         scene = synthetic.piping(runs=runs, seed=seed)
-        marks = [time.perf_counter()]
+        marks = [time.process_time()]
         found = cylx.extract(scene.points)
-        marks.append(time.perf_counter())
+        marks.append(time.process_time())
         result = cylx.to_dict(cylx.find_runs(found))
-        marks.append(time.perf_counter())
+        marks.append(time.process_time())
         seconds += [later - earlier for earlier, later in pairwise(marks)]
         score = cylx.evaluate(scene.truth(), result)
         straights = counts.setdefault("straight", np.zeros(3, int))
@@ -80,7 +81,7 @@ def report_plants(sizes, seeds, bars, held):
         share = float(np.mean(good)) if good else None
         said = bars.at_least(share, 0.9 if held else None)
         print_row(name, "elbows within 5 % and 1°", str(len(good)), share, None, None, said)
-        print_row(name, "seconds: cylinders, runs", "", float(seconds[0]), float(seconds[1]), None, "")
+        print_row(name, "seconds of processor: cylinders, runs", "", float(seconds[0]), float(seconds[1]), None, "")
     print()
     print_header("confidence of fittings", "there", "mean", "true or not asked for")
     confidence, true = np.array(everywhere, dtype=float).reshape(-1, 2).T

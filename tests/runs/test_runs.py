@@ -184,14 +184,32 @@ def test_a_gap_within_a_pipe_is_bridged_and_said_to_be_assumed():
     assert found.length == pytest.approx(0.3, abs=0.02)
 
 
-def test_a_cap_closes_an_end():
+def test_a_cap_closes_an_end_of_a_run():
+    work = elbow()
+    work.disc(np.array([-1.0, 0, 0]), X, 0.0, R)
+    traced = work.traced()
+    (found,) = of_kind(traced, "cap")
+    assert found.center == pytest.approx([-1, 0, 0], abs=0.003)
+    assert found.axis == pytest.approx(-X, abs=0.01)
+    assert [one.kind for one in traced.piping.fittings if one is not found] == ["elbow"]
+
+
+def test_a_disc_at_the_end_of_a_cylinder_alone_is_no_cap():
     work = Pipework()
     work.pipe([-1, 0, 0], [0, 0, 0], R)
     work.disc(np.zeros(3), X, 0.0, R)
-    (found,) = work.traced().piping.fittings
-    assert found.kind == "cap"
-    assert found.center == pytest.approx(np.zeros(3), abs=0.003)
-    assert found.axis == pytest.approx(X, abs=0.01)
+    assert work.traced().piping.fittings == ()
+
+
+def test_two_pipes_that_overlap_in_a_slight_bend_are_joined_once():
+    work, angle = Pipework(), math.radians(15.0)
+    work.pipe([-0.2, 0, 0], [0, 0, 0], R, over=(0, 0.09))
+    end, onward = work.bend([0, 0, 0], X, Y, 0.18, angle, R)
+    work.pipe(end, end + 0.2 * onward, R, over=(0.09, 0))
+    traced = work.traced()
+    assert [one.kind for one in traced.piping.fittings] == ["elbow"]
+    assert [one.cylinder.height for one in traced.cylinders] == pytest.approx([0.2, 0.2], abs=0.03)
+    assert math.degrees(traced.piping.fittings[0].angle) == pytest.approx(15.0, abs=1.0)
 
 
 def test_what_is_found_turns_and_grows_with_the_cloud():
