@@ -201,7 +201,7 @@ def test_every_stage_is_told_of_with_its_reasons():
 
 def test_every_reason_of_a_rejection_is_told_of():
     told = part(read("docs/json-format.md"), "## The rejected")
-    reasons = {term.reason for term in evidence_weights.TERMS}
+    reasons = {term.reason for term in (*evidence_weights.TERMS, *evidence_weights.UPRIGHT_TERMS)}
     reasons |= set(re.findall(r'"([a-z _]+)": ', inspect.getsource(verification.broken_limit)))
     ours = r'"([a-z_ ]+ (?:range|one|max_cylinders))"'
     for module, found in ((averaging, r'return "([a-z ]+)"'), (rounds, ours), (priors, ours)):
