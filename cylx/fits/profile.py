@@ -19,7 +19,7 @@ from cylx.geometry.numerics import solve_in_place
 
 LEAST_ON_LINE, LEAST_ON_ARC = 12, 12
 """Points of a line and of the arc."""
-LINE_LENGTHS = 0.4, 0.55, 0.75, 1.0, 1.4, 2.0
+LINE_LENGTHS = 0.4, 0.55, 0.75, 1.0, 1.4, 2.0, 3.0
 """The lines count up to so many radii of the first circle past where they touch the arc: as far as they go on so."""
 LAST_TO_START, TELLING = 4, 2.0
 """Lines are first this short, as far as they have points and are longer, in radii, than so many roots of the deviation

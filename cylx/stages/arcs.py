@@ -16,9 +16,9 @@ from cylx.records import IndexedCloud, Segment
 
 ARC_FLAT, ARC_STEPS = 0.2, 4
 """Points of flat windows of this share of what is too flat are not of an arc, and so many fits settle it."""
-REACH = 2.5
+REACH = 3.3
 """The profile is fitted to what lies within so many radii of the axis."""
-ENOUGH_OF_PROFILE = 3000
+ENOUGH_OF_PROFILE = 6000
 """Points of it that suffice."""
 LEAST_DEVIATION = 0.004
 """Deviation of the points, in radii, from which they hide where an arc ends; of less, their normals show it."""
