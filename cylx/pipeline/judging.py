@@ -20,8 +20,6 @@ SHORTEST_PIECE = 5.0
 UNEVEN, MOST_UNEVEN = 0.02, 0.1
 """Structure in the residuals, in radii, from which a long segment is looked at in pieces, as a trunk bends and tapers;
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
-HALVED = 0.8
-"""A piece is halved again if it has less structure than this share of what it was cut from."""
 MOST_ARC = math.radians(270.0)
 """Angle of the surface from which a refused segment is no arc between two planes."""
 MOST_LOOSENED, LEAST_KEPT = 1.05, 0.85
@@ -60,24 +58,21 @@ class Judge:
     def in_pieces(self, segment: Segment, support: int, payoff: float) -> list[Finding | RejectedSegment]:
         """Verify a segment; where a long one has not the form of a cylinder, give the pieces of it that have.
 
-        It is halved until its pieces pass, so that they are as long as may be, and only as long as halving helps: what
-        bends or tapers is straighter in halves, but the section of a beam stays as it is.
+        It is halved until its pieces pass, so that they are as long as may be.
         """
         whole = self.judge(segment, support, payoff)
         if not _may_have_pieces(whole):
             return [whole]
         pieces: list[Finding | RejectedSegment] = []
-        left = _halves(segment, whole)
+        left = _halves(segment)
         while left:
-            piece, uneven = left.pop(0)
+            piece = left.pop(0)
             fitted = self._refit(piece)
-            if isinstance(fitted, str):
-                continue
-            found = self.judge(fitted, support, payoff)
+            found = fitted if isinstance(fitted, str) else self.judge(fitted, support, payoff)
             if isinstance(found, Finding) and found.measures["deviation_radii"] <= MOST_UNEVEN:
                 pieces.append(found)
-            elif _may_have_pieces(found) and found.measures["structure_radii"] < HALVED * uneven:
-                left += _halves(piece, found)
+            elif isinstance(found, RejectedSegment) and _may_have_pieces(found):
+                left += _halves(piece)
         return pieces or [whole]
 
     def judge(self, segment: Segment, support: int, payoff: float) -> Finding | RejectedSegment:
@@ -180,13 +175,13 @@ def _may_have_pieces(one: Finding | RejectedSegment) -> bool:
     return one.measures["height_radii"] >= 2.0 * SHORTEST_PIECE and one.measures["structure_radii"] > UNEVEN
 
 
-def _halves(segment: Segment, judged: Finding | RejectedSegment) -> list[tuple[Segment, float]]:
-    """Cut a segment across its axis in the middle; with each half comes the structure of the whole."""
+def _halves(segment: Segment) -> list[Segment]:
+    """Cut a segment across its axis in the middle."""
     parts = []
     for side in (-0.5, 0.5):
         model = segment.model.copy()
         model[:3] += side * segment.half * segment.direction
-        parts.append((replace(segment, model=model, half=0.5 * segment.half), judged.measures["structure_radii"]))
+        parts.append(replace(segment, model=model, half=0.5 * segment.half))
     return parts
 
 
