@@ -9,8 +9,9 @@ import numpy as np
 from cylx.evidence.measures import Shell
 from cylx.geometry.arrays import FloatArray
 
-SIDES, PHASES, ENOUGH_FOR_PRISM = (4, 5, 6, 8), 16, 1200
-"""Sides of the prisms that a surface is compared with, turns of each, and points that suffice for it."""
+SIDES, PHASES, REFINED, ENOUGH_FOR_PRISM = (4, 5, 6, 8), 16, 4, 1200
+"""Sides of the prisms that a surface is compared with, turns of each, how often the step between them is halved about
+the best, and points that suffice for it."""
 MOST_LEFT, LEAST_SHARE = 2.0, 0.8
 """A surface is a prism if its points deviate from that by no more than this, as mean square in squared deviations, and
 if it explains so much: what is rough is more like one of many prisms than like a cylinder, too."""
@@ -30,7 +31,7 @@ def prism_share(shell: Shell, radius: float, deviation: float) -> float:
     radius : float
         Frame units.
     deviation : float
-        Of the noise, frame units.
+        Standard deviation of the surface's own points about it, without its form, frame units.
 
     Returns
     -------
@@ -51,12 +52,20 @@ def prism_share(shell: Shell, radius: float, deviation: float) -> float:
     excess = round_ - EXPECTED * len(about)
     if excess <= 0.0:
         return 0.0
+
+    def turned(phase: float, wide: float) -> float:
+        slant = np.cos((angles - phase) % wide - 0.5 * wide)  # of the distance, to that from the side
+        heights = distances * slant
+        return misfit(heights - np.median(heights))
+
     best = round_
     for sides in SIDES:
         wide = 2.0 * math.pi / sides
-        for phase in np.arange(PHASES) / PHASES * wide:
-            slant = np.cos((angles - phase) % wide - 0.5 * wide)  # of the distance, to that from the side
-            heights = distances * slant
-            best = min(best, misfit(heights - np.median(heights)))
+        step = wide / PHASES
+        least, phase = min((turned(step * k, wide), step * k) for k in range(PHASES))
+        for _ in range(REFINED):
+            step /= 2.0
+            least, phase = min((least, phase), *((turned(near, wide), near) for near in (phase - step, phase + step)))
+        best = min(best, least)
     share = min(1.0, max(0.0, (round_ - best) / excess))
     return share if best <= MOST_LEFT * len(about) and share >= LEAST_SHARE else 0.0

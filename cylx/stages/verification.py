@@ -152,7 +152,7 @@ def _measures_of(
         "structure_radii": structure / radius,
         "ovality": form["ovality"] / radius,
         "explained": form["explained"],
-        "prism": _prism(shell, form, radius, max(noise, scatter), coverage),
+        "prism": _prism(shell, form, radius, scatter, coverage),
         "facets": facets(shell, indexed.flatness, radius, scatter),
         "deviation_radii": deviation / radius,
         "inside": inside,
@@ -178,11 +178,14 @@ def _measures_of(
     return measures, (shape["offset_error"], shape["tilt_error"])
 
 
-def _prism(shell: Shell, form: dict[str, float], radius: float, deviation: float, coverage: float) -> float:
-    """Return the share of the deviation of form that a prism explains; it is compared only where that is no noise."""
+def _prism(shell: Shell, form: dict[str, float], radius: float, scatter: float, coverage: float) -> float:
+    """Return the share of the deviation of form that a prism explains; it is compared only where that is no noise.
+
+    What is told as noise about a small thing may be its own corners; its points' own scatter has none of them.
+    """
     if coverage < CLOSED or form["lack_of_fit"] < DEVIATES:
         return form["prism"]
-    return max(form["prism"], prism_share(shell, radius, deviation))
+    return max(form["prism"], prism_share(shell, radius, scatter))
 
 
 def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:

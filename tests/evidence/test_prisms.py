@@ -22,7 +22,7 @@ def beam(sides, sigma, seed=0, count=4000, turn=0.3):
 
 
 @pytest.mark.parametrize("sides", [4, 5, 6, 8])
-@pytest.mark.parametrize("share", [0.15, 0.3])
+@pytest.mark.parametrize("share", [0.02, 0.15, 0.3])
 def test_a_prism_explains_a_beam_whose_corners_the_surface_has_not(sides, share):
     # noise as a share of how far the corners stand out
     sigma = share * (1.0 / np.cos(np.pi / sides) - 1.0)
