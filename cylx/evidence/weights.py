@@ -32,214 +32,90 @@ cross-validation, no scene being judged by weights that had seen it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from collections.abc import Mapping
 
-
-class Term(NamedTuple):
-    """One line of the sum.
-
-    Parameters
-    ----------
-    reason : str
-        What is wrong if it is the worst of all.
-    weight : float
-        Change of the log-odds by one unit of the term.
-    usual : float
-        Its mean over true cylinders: what a term is compared with to find the worst.
-    value : callable
-        The term as a function of the measures.
-    """
-
-    reason: str
-    weight: float
-    usual: float
-    value: Callable[[Mapping[str, float]], float]
-
-
-FORM = 0.012
-"""Real objects deviate from a cylinder by about this share of their radius: cans have seams, pipes are out of round."""
-STEEP = 0.08
-"""A slope beyond what is excused of this much counts twice."""
-SEEN = 0.005
-"""Move of the ends, in radii, that counts in full."""
-FORM_SCATTER = 1.2
-"""No deviation of form beyond this many times the scatter is excused: that of a large radius could hide anything."""
-TELLING = 600.0
-"""Points up to which a lack of fit is more than the form error of a real object could show."""
-THIN = 20.0
-"""Radius over scatter up to which a flank counts in full."""
-BEHIND = 0.7
-"""Angle (radians) that must be covered behind a flank for it not to count at all."""
-PRISM = 0.6
-"""Share of the deviation of form that makes a prism of a cylinder, whether or not the noise hides its faces: no real
-cylinder among those of the rows has so much of it."""
-LEAST_SCATTER = 1e-4
-"""Scatter in radii below which nothing is told apart."""
-
-
-def _log(value: float, low: float, high: float) -> float:
-    return math.log(min(max(value, low), high))
-
-
-def _thickness(measures: Mapping[str, float]) -> float:
-    """Return the thickness of the surface over the scatter of its points, without the form that is excused."""
-    scatter = max(measures["scatter_radii"], LEAST_SCATTER)
-    excused = min(measures["form_radii"], FORM, FORM_SCATTER * scatter) / scatter
-    return math.sqrt(max(measures["roughness"] ** 2 - excused**2, 1.0))
-
-
-def _misfit(measures: Mapping[str, float]) -> float:
-    """Return the lack of fit, up to three, the less the more points there are: many show the form of any object."""
-    return _log(measures["lack_of_fit"], 1.0, 3.0) * min(1.0, TELLING / max(measures["inliers"], 1.0))
-
-
-def _explained(measures: Mapping[str, float]) -> float:
-    """Return the share of the deviation of form that another shape explains, beyond what chance brings."""
-    share = measures["explained"]
-    if measures["facets"] > 0.5 or measures["prism"] > PRISM:
-        share = max(share, measures["prism"])
-    return max(0.0, share - 0.3) * min(1.0, measures["structure_radii"] / 0.01)
-
-
-def _facets(measures: Mapping[str, float]) -> float:
-    """Return how far a surface is made of flat pieces that deviate from a cylinder."""
-    return max(0.0, measures["facets"] - 0.5) * min(2.0, max(0.0, measures["roughness"] - 1.3))
-
-
-def _payoff(measures: Mapping[str, float]) -> float:
-    """Return the payoff: candidates of a cylinder that scatters much for its radius agree less well."""
-    return min(measures["payoff"] + 1.5 * min(measures["scatter_radii"], 0.2), 1.0)
-
-
-def _slope(measures: Mapping[str, float]) -> float:
-    """Return the slope beyond two standard errors, or beyond what moves the ends by `FORM`; a steep one counts more."""
-    excused = max(2.0 * measures["slope_error"], FORM / _height(measures))
-    slope = max(0.0, abs(measures["slope"]) - excused)
-    return min(slope + slope**2 / STEEP, 0.5)
-
-
-def _flank(measures: Mapping[str, float]) -> float:
-    """Return the flank, at most 0.3, of what may be an edge: thin, and seen from little more than one side.
-
-    A camera smears the outline of anything, tangentially; the end of the arc of a thick cylinder can be seen, and what
-    goes on past it is in `tangent`. An edge covers half a turn, and as much more on either side as its flanks stay
-    within three deviations of the surface; an edge has nothing behind its flanks.
-    """
-    radius = 1.0 / max(measures["scatter_radii"], LEAST_SCATTER)
-    most = math.pi + 2.0 * math.acos(radius / (radius + 3.0))
-    behind = min(max(0.0, (measures["coverage"] - most) / BEHIND), 1.0)
-    return min(measures["flank"], 0.3) * min(1.0, (THIN / radius) ** 2) * (1.0 - behind)
-
-
-def _bulge(measures: Mapping[str, float]) -> float:
-    """Return the bulge, at most 0.3, less one so small, for its height, that a real object's form may have it.
-
-    A waist may be as large as a bend: few things have one, but rims and lids seen with a wall pull its ends out.
-    """
-    excused = (2.0 if measures["bulge"] > 0.0 else 8.0) * FORM / _height(measures) ** 2
-    return min(max(0.0, abs(measures["bulge"]) - excused), 0.3)
-
-
-def _barrel(measures: Mapping[str, float]) -> float:
-    """Return the bulge of what stands on a plane, up to one, beyond two standard errors or what form may have.
-
-    The band of a ball about its equator is as round as a disc; its bulge is one.
-    """
-    excused = max(2.0 * measures["bulge_error"], 2.0 * FORM / _height(measures) ** 2)
-    return min(max(0.0, measures["bulge"] - excused), 1.0)
-
-
-def _bend(measures: Mapping[str, float]) -> float:
-    """Return the bend beyond two standard errors, or beyond what moves the ends by `FORM`; at most 0.2."""
-    excused = max(2.0 * measures["bend_error"], 8.0 * FORM / _height(measures) ** 2)
-    return min(max(0.0, measures["bend"] - excused), 0.2)
-
-
-def _one_shape(measures: Mapping[str, float]) -> float:
-    """Return the share of the scatter that one bend, slope or bulge explains, beyond a quarter.
-
-    The scatter of real things has many causes; where one of these makes most of it, the thing is an elbow, a cone or a
-    barrel, however little of it is seen. What moves the surface by less than `SEEN` does not count in full.
-    """
-    height, best = _height(measures), 0.0
-    for name, moves in (("bend", height**2 / 8.0), ("slope", height / 2.0), ("bulge", height**2 / 8.0)):
-        square = (measures[name] / max(measures[name + "_error"], 1e-12)) ** 2
-        share = square / (square + measures["inliers"])
-        best = max(best, share * min(1.0, abs(measures[name]) * moves / SEEN))
-    return max(0.0, best - 0.25)
-
-
-def _height(measures: Mapping[str, float]) -> float:
-    return max(measures["height_radii"], 0.05)
-
+from cylx.evidence.terms import (
+    Term,
+    barrel,
+    bend,
+    bulge,
+    explained,
+    facets,
+    flank,
+    log,
+    misfit,
+    one_shape,
+    payoff,
+    slope,
+    thickness,
+)
 
 BIAS = -3.551
 TERMS = (
     # what its form is like
-    Term("form", -1.708, 0.10, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
-    Term("other shape", -6.630, 0.01, _explained),
-    Term("lack of fit", -1.067, 0.17, _misfit),
-    Term("facets", -2.326, 0.02, _facets),
+    Term("form", -1.708, 0.10, lambda m: log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("other shape", -6.630, 0.01, explained),
+    Term("lack of fit", -1.067, 0.17, misfit),
+    Term("facets", -2.326, 0.02, facets),
     # other points inside and just outside, and going on past an end of the arc or off to one side
-    Term("inside", -1.476, 0.03, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -1.071, 0.21, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("inside", -1.476, 0.03, lambda m: log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -1.071, 0.21, lambda m: log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
     Term("tangent", -1.602, 0.03, lambda m: min(m["tangent"], 1.5)),
-    Term("flank", -14.648, 0.00, _flank),
+    Term("flank", -14.648, 0.00, flank),
     # how much of a cylinder is there at all
-    Term("few points", 3.203, -0.02, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
-    Term("few lines", 1.007, -0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
-    Term("curvature", 1.412, 1.56, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
+    Term("few points", 3.203, -0.02, lambda m: log(m["inliers"] / 100.0, 0.2, 1.0)),
+    Term("few lines", 1.007, -0.00, lambda m: log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
+    Term("curvature", 1.412, 1.56, lambda m: log(m["curvature"] / 20.0, 0.2, 5.0)),
     # what the candidates say
-    Term("payoff", 3.734, 0.82, _payoff),
-    Term("agreement", 4.160, 0.40, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
+    Term("payoff", 3.734, 0.82, payoff),
+    Term("agreement", 4.160, 0.40, lambda m: log(m["agreement"] / 0.5, 0.3, 1.6)),
     # cones, barrels, elbows
-    Term("slope", -10.0, 0.01, _slope),
-    Term("bulge", -8.147, 0.01, _bulge),
-    Term("bend", -5.977, 0.00, _bend),
-    Term("cone, barrel or elbow", -58.443, 0.00, _one_shape),
+    Term("slope", -10.0, 0.01, slope),
+    Term("bulge", -8.147, 0.01, bulge),
+    Term("bend", -5.977, 0.00, bend),
+    Term("cone, barrel or elbow", -58.443, 0.00, one_shape),
 )
 
 BLEND_BIAS = -13.731
 BLEND_TERMS = (
-    Term("noise", -11.701, 0.00, lambda m: _log(_thickness(m), 1.0, 20.0)),
-    Term("form", -3.958, 0.00, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("noise", -11.701, 0.00, lambda m: log(thickness(m), 1.0, 20.0)),
+    Term("form", -3.958, 0.00, lambda m: log(m["structure_radii"] / 0.02, 1.0, 10.0)),
     Term("oval", -24.556, 0.00, lambda m: min(m["ovality"], 0.1)),
-    Term("lack of fit", -2.014, 0.31, _misfit),
-    Term("few lines", 4.919, 0.00, lambda m: _log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
-    Term("curvature", 4.900, 1.61, lambda m: _log(m["curvature"] / 20.0, 0.2, 5.0)),
+    Term("lack of fit", -2.014, 0.31, misfit),
+    Term("few lines", 4.919, 0.00, lambda m: log(m["places"] / 12.0, 1.0 / 12.0, 1.0)),
+    Term("curvature", 4.900, 1.61, lambda m: log(m["curvature"] / 20.0, 0.2, 5.0)),
     Term("payoff", 8.413, 0.87, lambda m: m["payoff"]),
-    Term("agreement", 7.805, 0.38, lambda m: _log(m["agreement"] / 0.5, 0.1, 1.5)),
-    Term("inside", -1.231, 0.53, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("agreement", 7.805, 0.38, lambda m: log(m["agreement"] / 0.5, 0.1, 1.5)),
+    Term("inside", -1.231, 0.53, lambda m: log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
 )
 
 PROFILE_BIAS = -0.484
 PROFILE_TERMS = (
-    Term("noise", -21.204, 0.03, lambda m: _log(m["noise_ratio"], 1.0, 2.0)),
+    Term("noise", -21.204, 0.03, lambda m: log(m["noise_ratio"], 1.0, 2.0)),
     Term("form", -0.626, 0.10, lambda m: min(m["structure"], 1.5)),
     Term("oval", -47.833, 0.00, lambda m: min(m["ovality"], 0.05)),
-    Term("lack of fit", -1.753, 0.33, lambda m: _log(m["lack_of_fit"], 1.0, 8.0)),
-    Term("edge", 0.441, 1.39, lambda m: _log(m["edge_gain"] / max(m["inliers"], 20.0), 0.02, 5.0)),
+    Term("lack of fit", -1.753, 0.33, lambda m: log(m["lack_of_fit"], 1.0, 8.0)),
+    Term("edge", 0.441, 1.39, lambda m: log(m["edge_gain"] / max(m["inliers"], 20.0), 0.02, 5.0)),
     Term("tangent", 1.939, 0.94, lambda m: min(m["tangent_both"], 1.0)),
-    Term("few points", 3.399, 0.68, lambda m: _log(m["inliers"] / 100.0, 0.2, 3.0)),
-    Term("roughness", -4.613, 0.03, lambda m: _log(m["roughness"], 1.0, 1.5)),
+    Term("few points", 3.399, 0.68, lambda m: log(m["inliers"] / 100.0, 0.2, 3.0)),
+    Term("roughness", -4.613, 0.03, lambda m: log(m["roughness"], 1.0, 1.5)),
 )
 
 
 UPRIGHT_BIAS = 5.725
 UPRIGHT_TERMS = (
-    Term("noise", -12.596, 0.06, lambda m: _log(m["noise_ratio"], 1.0, 2.0)),
-    Term("form", -1.192, 0.00, lambda m: _log(m["structure_radii"] / 0.02, 1.0, 10.0)),
+    Term("noise", -12.596, 0.06, lambda m: log(m["noise_ratio"], 1.0, 2.0)),
+    Term("form", -1.192, 0.00, lambda m: log(m["structure_radii"] / 0.02, 1.0, 10.0)),
     Term("oval", -55.839, 0.00, lambda m: min(m["ovality"], 0.05)),
-    Term("lack of fit", -2.394, 0.21, _misfit),
-    Term("facets", -6.420, 0.00, _facets),
-    Term("other shape", -6.630, 0.01, _explained),
-    Term("inside", -0.491, 0.40, lambda m: _log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("outside", -1.805, 0.07, lambda m: _log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
-    Term("few points", 5.279, -0.22, lambda m: _log(m["inliers"] / 100.0, 0.2, 1.0)),
-    Term("agreement", 2.155, -0.18, lambda m: _log(m["agreement"] / 0.5, 0.3, 1.6)),
-    Term("slope", -10.0, 0.01, _slope),
-    Term("bulge", -8.147, 0.01, _barrel),
+    Term("lack of fit", -2.394, 0.21, misfit),
+    Term("facets", -6.420, 0.00, facets),
+    Term("other shape", -6.630, 0.01, explained),
+    Term("inside", -0.491, 0.40, lambda m: log(m["inside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("outside", -1.805, 0.07, lambda m: log(m["outside"] / 0.1 + 1.0, 1.0, 51.0)),
+    Term("few points", 5.279, -0.22, lambda m: log(m["inliers"] / 100.0, 0.2, 1.0)),
+    Term("agreement", 2.155, -0.18, lambda m: log(m["agreement"] / 0.5, 0.3, 1.6)),
+    Term("slope", -10.0, 0.01, slope),
+    Term("bulge", -8.147, 0.01, barrel),
 )
 
 

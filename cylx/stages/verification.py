@@ -16,13 +16,13 @@ from cylx.evidence.measures import (
     TRUNCATED,
     Shell,
     deviations_of_form,
-    distinct_places,
     edge_gain,
     facets,
     look_at,
     own_scatter,
     shape_of,
 )
+from cylx.evidence.places import distinct_places
 from cylx.evidence.prisms import prism_share
 from cylx.evidence.surroundings import clear_of_ends, continuation, emptiness, flank
 from cylx.evidence.weights import weigh, weigh_blend, weigh_profile, weigh_upright

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from cylx.config import Config, VerificationConfig
-from cylx.evidence.measures import PLACES, distinct_places, look_at
+from cylx.evidence.measures import look_at
+from cylx.evidence.places import PLACES, distinct_places
 from cylx.geometry.cells import Cells
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import Cylinder
