@@ -19,7 +19,8 @@ from cylx.stages.curvature import find_curved_windows
 from cylx.stages.ellipses import fit_ellipses
 from cylx.stages.local_slices import slice_windows
 from cylx.stages.patches import find_curved_patches
-from cylx.stages.rims import directions_of_planes, find_rims
+from cylx.stages.plane_directions import directions_of_planes
+from cylx.stages.rims import find_rims
 from cylx.stages.slicing import cut_slice, draw_planes
 
 LARGE = 6.0

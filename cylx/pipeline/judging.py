@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from cylx.game.agreement import Neighbourhood, is_contradicted
 from cylx.records import Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
@@ -12,7 +14,7 @@ from cylx.segments.finishing import finish, inflation
 from cylx.segments.refitting import refit
 from cylx.stages.arcs import arcs_of
 from cylx.stages.averaging import ENOUGH_TO_JUDGE
-from cylx.stages.upright import upright_of
+from cylx.stages.upright import leans, upright_of
 from cylx.stages.verification import Verdict, may_be_arc, verify
 
 SHORTEST_PIECE = 5.0
@@ -23,7 +25,8 @@ and deviation, in radii, up to which a piece of what is no cylinder as a whole m
 MOST_ARC = math.radians(270.0)
 """Angle of the surface from which a refused segment is no arc between two planes."""
 MOST_LOOSENED, LEAST_KEPT = 1.05, 0.85
-"""A short cylinder leans if, held upright, its points scatter more by this factor, or it loses more than the rest."""
+"""A short cylinder is upright if its points scatter no more by this factor when it is held so, or do not say that it
+leans; and if it keeps this share of them."""
 OF_FORM = frozenset(
     {"form", "agreement", "other shape", "cone, barrel or elbow", "lack of fit", "bend", "bulge", "slope", "facets"}
 )
@@ -106,7 +109,7 @@ class Judge:
                     return arc
         if limits.enabled and verdict.measures and not segment.upright:
             standing = self._judge_upright(segment, support, payoff)
-            if standing is not None and (reason or _is_as_close(standing, verdict)):
+            if standing is not None and (reason or self._is_as_close(standing, segment, verdict)):
                 return standing
         if reason:
             confidence = verdict.confidence if verdict.measures else None
@@ -142,7 +145,8 @@ class Judge:
     def _judge_arc(self, segment: Segment, support: int, payoff: float, *, goes_on: bool) -> Finding | None:
         """Verify a segment as an arc that goes on tangentially, as far as is seen of it; None if it is none."""
         refit = self._refit if goes_on else None
-        for arc in arcs_of(segment, self._indexed, refit):
+        # the few rows of one that is held upright do not tell its axis
+        for arc in [segment] if segment.upright else arcs_of(segment, self._indexed, refit):
             if self.out_of_range(arc):
                 continue
             verdict = verify(arc, self._indexed, payoff, self._windows.agreement(arc), self._limits, arc=True)
@@ -158,14 +162,17 @@ class Judge:
         verdict = verify(held, self._indexed, payoff, self._windows.agreement(held), self._limits)
         return None if verdict.reason else _finding(held, verdict, support, payoff)
 
+    def _is_as_close(self, standing: Finding, free: Segment, verdict: Verdict) -> bool:
+        """Return whether a cylinder held upright explains its points about as well as one that was fitted freely."""
+        if len(standing.points) < LEAST_KEPT * len(verdict.points):
+            return False
+        if standing.measures["deviation_radii"] <= MOST_LOOSENED * verdict.measures["deviation_radii"]:
+            return True
+        points = self._indexed.points[np.union1d(standing.points, verdict.points)]
+        return not leans(points, free, standing.segment)
+
     def _refit(self, segment: Segment) -> Segment | str:
         return refit(segment, self._indexed, most=ENOUGH_TO_JUDGE)
-
-
-def _is_as_close(standing: Finding, free: Verdict) -> bool:
-    """Return whether a cylinder held upright explains its points about as well as one that was fitted freely."""
-    alike = standing.measures["deviation_radii"] <= MOST_LOOSENED * free.measures["deviation_radii"]
-    return alike and len(standing.points) >= LEAST_KEPT * len(free.points)
 
 
 def _may_have_pieces(one: Finding | RejectedSegment) -> bool:

@@ -7,7 +7,6 @@ circle, whatever their height.
 
 from __future__ import annotations
 
-import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -15,20 +14,9 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.circles import LEAST_ON, fill_circle
 from cylx.geometry.kernels import njit
-from cylx.geometry.morton import cell_starts, gather_ball
-from cylx.geometry.numerics import fill_basis, symmetric_eigen
-from cylx.records import Candidates, Explained, Frame, Nearby, StageReport
+from cylx.geometry.numerics import fill_basis
+from cylx.records import Candidates, Frame, Nearby, StageReport
 
-MOST_DIRECTIONS = 6
-"""Directions of planes that are tried."""
-ALIKE = math.cos(math.radians(4.0))
-"""Normals that enclose a smaller angle are those of one direction."""
-BESIDE, LEAST_BESIDE = math.cos(math.radians(15.0)), 0.5
-"""A direction this near to another needs this share of its normals: edges show some that lean."""
-LEAST_SHARE = 0.02
-"""Share of the points on planes that make a direction."""
-ENOUGH_NORMALS = 3000
-"""Normals among which the directions are found."""
 ACROSS = 0.5
 """Cosine to the direction from which a point lies on a cap, not on a wall."""
 MOST_SEEDS = 3000
@@ -43,27 +31,6 @@ MOST_SEEN = 1500
 """Points that suffice about a place."""
 LEAST_EXTENT = 4.0
 """Extent of a candidate along its axis in spacings, at least: its ends are to be found about a circle, too."""
-CELL_SIDE = 2.6
-"""Side of the cells, spacings, as near as they have it."""
-WIDEST, CAPACITY = 6.0, 512
-"""Spacings about a point in which it is asked for a plane, and points that are gathered."""
-
-
-def directions_of_planes(frame: Frame, explained: Explained, nearby: Nearby | None) -> FloatArray:
-    """Return the unit normals of the directions that planes have in a cloud, either way, shape (k, 3).
-
-    Parameters
-    ----------
-    frame : Frame
-    explained : Explained
-        Its flat windows are pieces of planes.
-    nearby : Nearby or None
-        From `find_curved_patches`.
-    """
-    normals = _normals_of_planes(frame, explained.flatness)
-    if nearby is not None:
-        normals = np.concatenate([normals, nearby.normals[nearby.looked_at[nearby.within]].astype(np.float64)])
-    return np.array(directions_of(normals)).reshape(-1, 3)
 
 
 def find_rims(
@@ -75,7 +42,7 @@ def find_rims(
     ----------
     frame : Frame
     directions : ndarray of shape (k, 3)
-        Of planes, from `directions_of_planes`.
+        Of planes, from `cylx.stages.plane_directions`.
     nearby : Nearby
         From `find_curved_patches`.
     radius_range : tuple of float
@@ -129,76 +96,6 @@ def _about(
         models[:, 7], models[:, 8] = own[:, 5], np.maximum(2.5 * own[:, 4], LEAST_EXTENT)
         parts.append(Candidates.of_windows(models, 0.5 * reach, points[seeds[good]]))
     return Candidates.joined(parts), len(seeds) * len(REACHES)
-
-
-def _normals_of_planes(frame: Frame, flatness: FloatArray) -> FloatArray:
-    """Return the normals of planes at some of the points in flat windows, either way."""
-    level = max(0, round(math.log2(CELL_SIDE / frame.unit)))
-    cells, starts = cell_starts(frame.codes, level)
-    which = np.flatnonzero(flatness > 0.0)
-    which = np.ascontiguousarray(which[:: 1 + len(which) // ENOUGH_NORMALS])  # one layout: one compiled kernel
-    normals = np.zeros((len(which), 3))
-    radii = np.minimum(flatness[which], WIDEST)
-    _fill_normals(frame.points, cells, starts, frame.unit * 2.0**level, which, radii, normals)
-    return normals[np.any(normals != 0.0, axis=1)]
-
-
-@njit(cache=True, nogil=True)
-def _fill_normals(
-    points: FloatArray,
-    cells: IndexArray,
-    starts: IndexArray,
-    side: float,
-    which: IndexArray,
-    radii: FloatArray,
-    normals: FloatArray,
-) -> None:
-    found, matrix, vectors, middle = np.empty(CAPACITY, np.int64), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    for s in range(len(which)):
-        n = gather_ball(points, cells, starts, side, points[which[s]], radii[s], found)
-        if n < 6:
-            continue
-        for d in range(3):
-            middle[d] = 0.0
-            for a in range(n):
-                middle[d] += points[found[a], d] / n
-        for d in range(3):
-            for e in range(3):
-                matrix[d, e] = 0.0
-                for a in range(n):
-                    matrix[d, e] += (points[found[a], d] - middle[d]) * (points[found[a], e] - middle[e])
-        symmetric_eigen(matrix, vectors)
-        least = 0
-        for a in range(1, 3):
-            if matrix[a, a] < matrix[least, least]:
-                least = a
-        for d in range(3):
-            normals[s, d] = vectors[d, least]
-
-
-def directions_of(normals: FloatArray) -> list[FloatArray]:
-    """Return the directions that many normals have, either way."""
-    normals = normals[:: 1 + len(normals) // ENOUGH_NORMALS]
-    count = len(normals)
-    found: list[FloatArray] = []
-    sizes: list[int] = []
-    while len(normals) >= max(LEAST_SHARE * count, 10.0) and len(found) < MOST_DIRECTIONS:
-        tried = normals[:: 1 + len(normals) // 200]
-        alike = np.abs(tried @ normals.T) > ALIKE
-        best = int(alike.sum(axis=1).argmax())
-        if alike[best].sum() < max(LEAST_SHARE * count, 10.0):
-            break
-        own = normals[alike[best]]
-        for _ in range(3):
-            _, vectors = np.linalg.eigh(own.T @ own)
-            direction = vectors[:, 2]
-            own = normals[np.abs(normals @ direction) > ALIKE]
-        beside = [size for one, size in zip(found, sizes, strict=True) if abs(one @ direction) > BESIDE]
-        if len(own) >= LEAST_BESIDE * max(beside, default=0):
-            found.append(direction)
-            sizes.append(len(own))
-        normals = normals[np.abs(normals @ direction) <= ALIKE]
-    return found
 
 
 @njit(cache=True, nogil=True)

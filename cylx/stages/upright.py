@@ -18,7 +18,7 @@ from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, distances_to, points_on
 from cylx.geometry.extent import visible_extent
 from cylx.records import IndexedCloud, Segment
-from cylx.segments.finishing import NEARLY_UPRIGHT, SHORT
+from cylx.segments.finishing import LEANING, NEARLY_UPRIGHT, SHORT
 from cylx.segments.refitting import LEAST_POINTS_OF_AVERAGE, own_points
 
 SURELY_UPRIGHT = math.cos(math.radians(2.0))
@@ -76,6 +76,31 @@ def upright_of(segment: Segment, indexed: IndexedCloud, nearly: float = NEARLY_U
         return None
     found = [_held(segment, normal, indexed) for normal in normals_about(segment.direction, indexed.planes, nearly)]
     return max((one for one in found if one is not None), key=lambda one: one[0], default=(0, None))[1]
+
+
+def leans(points: FloatArray, free: Segment, held: Segment) -> bool:
+    """Return whether points say that a short cylinder leans: its middle, as what is at its ends may be of a lid.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 3)
+        Of either, frame units.
+    free, held : Segment
+        The cylinder as it was fitted, and with its axis held to the normal of a plane.
+
+    Returns
+    -------
+    bool
+        False where the few points in the middle do not tell.
+    """
+    distances, clear = [], np.ones(len(points), np.bool_)
+    for one in (free, held):
+        above, off = distances_to(points, one.model)
+        distances.append(off)
+        clear &= np.abs(above) <= one.half - min(CLEAR * free.spread, MOST_END * one.half)
+    scale = max(free.spread, LEAST_NOISE * free.radius)
+    squares = [(np.minimum(off[clear] / scale, 3.0) ** 2).sum() for off in distances]
+    return bool(squares[1] - squares[0] > LEANING**2)
 
 
 def _held(segment: Segment, normal: FloatArray, indexed: IndexedCloud) -> tuple[int, Segment] | None:

@@ -9,7 +9,7 @@ from cylx.pipeline.candidates import candidates_of_patches, windows_and_explaine
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import PointCloud, SilentObserver
 from cylx.scene import prepare
-from cylx.stages.rims import MOST_DIRECTIONS, directions_of
+from cylx.stages.plane_directions import MOST_DIRECTIONS, directions_of
 
 STEP = 0.025
 """Spacing; the radius of the disc is 1."""
