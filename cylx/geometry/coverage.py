@@ -9,6 +9,7 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 
 SECTORS = 36
+LIKELY_STEPS = 8
 
 
 def covered_angle(angles: FloatArray) -> float:
@@ -21,6 +22,18 @@ def covered_angle(angles: FloatArray) -> float:
         return 0.0
     fine = int(np.clip(len(angles) // 20, SECTORS, 360))
     return float(filled_sectors(angles, fine).mean()) * 2.0 * math.pi
+
+
+def likely_angle(angles: FloatArray) -> float:
+    """Return the angle that a surface covers if its points lie at random: a few leave sectors of it empty by chance.
+
+    Of k points in each of the sectors that it covers, on average, a share of exp(-k) stays empty.
+    """
+    share = covered_angle(angles) / (2.0 * math.pi)
+    likely = share
+    for _ in range(LIKELY_STEPS if share > 0.0 else 0):
+        likely = min(1.0, share / -math.expm1(-len(angles) / (SECTORS * likely)))
+    return likely * 2.0 * math.pi
 
 
 def filled_sectors(angles: FloatArray, sectors: int, share: float = 0.15) -> MaskArray:

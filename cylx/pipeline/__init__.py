@@ -132,6 +132,8 @@ def search_cylinders(prepared: Prepared, log: StageLog) -> Search:
             segments = rounds.fit(clusters)
         with log.stage("verification"):
             rounds.verify(segments, log)
+    with log.stage("verification"):
+        rounds.look_about_axes(log)
     rounds.report(log)
     with log.stage("merging"):
         findings = rounds.merge(log)

@@ -14,7 +14,8 @@ from cylx.segments.finishing import finish, inflation
 from cylx.segments.refitting import refit
 from cylx.stages.arcs import arcs_of
 from cylx.stages.averaging import ENOUGH_TO_JUDGE
-from cylx.stages.upright import leans, upright_of
+from cylx.stages.level_part import level_part_of
+from cylx.stages.upright import HELD, leans, upright_of
 from cylx.stages.verification import Verdict, may_be_arc, verify
 
 SHORTEST_PIECE = 5.0
@@ -160,6 +161,11 @@ class Judge:
         if held is None or self.out_of_range(held):
             return None
         verdict = verify(held, self._indexed, payoff, self._windows.agreement(held), self._limits)
+        if verdict.reason in OF_FORM or verdict.reason == "noise":
+            level = level_part_of(held, self._indexed, HELD)
+            if level is not None:
+                held = level
+                verdict = verify(held, self._indexed, payoff, self._windows.agreement(held), self._limits)
         return None if verdict.reason else _finding(held, verdict, support, payoff)
 
     def _is_as_close(self, standing: Finding, free: Segment, verdict: Verdict) -> bool:

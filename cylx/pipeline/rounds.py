@@ -16,14 +16,16 @@ from cylx.pipeline.judging import Judge
 from cylx.pipeline.stage_log import StageLog
 from cylx.records import Candidates, Cluster, Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared
+from cylx.segments.finishing import SHORT
 from cylx.stages.averaging import average_cluster, refine
 from cylx.stages.clustering import CandidateGame
+from cylx.stages.coaxial import walls_about
 from cylx.stages.consensus import of_one_place, of_one_surface
 from cylx.stages.extending import extend
 from cylx.stages.measuring import measure_extent
 from cylx.stages.merging import as_rows, drop_claimed, is_part_of, merge_pieces
 from cylx.stages.parting import parted
-from cylx.stages.upright import SURELY_UPRIGHT, upright_of
+from cylx.stages.upright import SURELY_UPRIGHT, held_as_is, upright_of
 
 Item = TypeVar("Item")
 Outcome = TypeVar("Outcome")
@@ -34,6 +36,8 @@ FOUND_BEFORE = "found before"
 
 OTHER_WALL = 0.03
 """A window further off a surface than this share of its radius, and than five deviations, was laid on another wall."""
+AXES_OF_AXES = 3
+"""Walls are looked for about the axes of cylinders, and of walls found so, so many times in all."""
 ROUND = 16
 """Clusters fitted at the same time; the number does not depend on that of the threads, and so the result does not."""
 
@@ -193,6 +197,33 @@ class Rounds:
             return found
         known = as_rows([finding.segment for finding in self.findings])
         return RejectedSegment.of(found, FOUND_BEFORE) if is_part_of(found.segment, known) else found
+
+    def look_about_axes(self, log: StageLog) -> None:
+        """Look for further walls about the axes of the cylinders found so far, and of those found so."""
+        if not (self._removes and self._config.verification.enabled):
+            return
+        fresh = [finding for finding in self.findings if not finding.blend]
+        for _ in range(AXES_OF_AXES):
+            free = np.ones(len(self._indexed.points), np.bool_)
+            for finding in self.findings:
+                free[finding.points] = False
+            start = len(self.findings)
+            walls = self._over_threads(lambda one, free=free: walls_about(one, self._indexed, free), fresh)
+            fitted = [(wall, one) for one, found in zip(fresh, walls, strict=True) for wall in found]
+            self.verify(self._over_threads(lambda pair: self._fit_wall(*pair), fitted), log)
+            fresh = [finding for finding in self.findings[start:] if not finding.blend]
+            if not fresh:
+                break
+
+    def _fit_wall(self, wall: Segment, known: Finding) -> Fitted | RejectedSegment:
+        """Fit a wall about a known axis; a short one does not tell its axis better."""
+        short = wall.half <= SHORT * wall.radius
+        fitted = (held_as_is if short else refine)(wall, self._indexed)
+        if fitted is None or isinstance(fitted, str):
+            return RejectedSegment(wall, fitted or "no fit", known.support, known.payoff)
+        if is_part_of(fitted, as_rows([finding.segment for finding in self.findings])):
+            return RejectedSegment(fitted, FOUND_BEFORE, known.support, known.payoff)
+        return Fitted(fitted, known.support, known.payoff)
 
     def report(self, log: StageLog) -> None:
         """Note what the game and the verification considered, kept and rejected."""

@@ -14,7 +14,7 @@ import numpy as np
 
 from cylx.fits.likelihood import Prior, fit_mixture
 from cylx.geometry.arrays import FloatArray
-from cylx.geometry.coverage import covered_angle
+from cylx.geometry.coverage import likely_angle
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, distances_to, points_on
 from cylx.geometry.extent import visible_extent
 from cylx.records import IndexedCloud, Segment
@@ -78,6 +78,19 @@ def upright_of(segment: Segment, indexed: IndexedCloud, nearly: float = NEARLY_U
     return max((one for one in found if one is not None), key=lambda one: one[0], default=(0, None))[1]
 
 
+def held_as_is(segment: Segment, indexed: IndexedCloud) -> Segment | None:
+    """Fit a short cylinder about the direction it has; None if there is no such surface.
+
+    Parameters
+    ----------
+    segment : Segment
+        About an axis that is known.
+    indexed : IndexedCloud
+    """
+    found = _held(segment, segment.direction, indexed)
+    return None if found is None else found[1]
+
+
 def leans(points: FloatArray, free: Segment, held: Segment) -> bool:
     """Return whether points say that a short cylinder leans: its middle, as what is at its ends may be of a lid.
 
@@ -138,7 +151,7 @@ def _held(segment: Segment, normal: FloatArray, indexed: IndexedCloud) -> tuple[
         if half < SHORTEST or half > SHORT * model[RADIUS]:
             return None
         clear = np.abs(heights - 0.5 * (low + high)) < half - min(CLEAR * noise, MOST_END * half)
-        if not clear.any() or covered_angle(angles[clear]) < LEAST_COVERAGE:
+        if not clear.any() or likely_angle(angles[clear]) < LEAST_COVERAGE:
             return None
     held = replace(segment, model=model, half=half, spread=spread, covariance=None, choice=None, upright=True)
     return count, held
