@@ -41,6 +41,8 @@ TOLERANCE, LEAST_TOLERANCE = 2.5, 0.05
 LEAST_ON_FACE, LEAST_AREA, LEAST_WIDTH = 25, 0.25, 0.25
 """Points that make a face; the area that a pair spans with the place, in squared reaches; and its width (rms) the
 narrower way, in reaches: a strip of a curved surface is narrower."""
+MOST_BESIDE = 0.2
+"""Points up to twice as far off as those on it, as a share of these: a curved surface goes on there."""
 MOST_ABOUT, FACE_CAPACITY = 400, 4096
 """Points that suffice about a place, and points that are gathered."""
 
@@ -129,12 +131,13 @@ def _fill_best_plane(local: FloatArray, k: int, area: float, tolerance: float, n
 
 @njit(cache=True, nogil=True)
 def _fill_refined(local: FloatArray, k: int, width: float, tolerance: float, normal: FloatArray) -> bool:
-    """Fit the normal of a plane to the points on it; False if they are not so wide either way (rms)."""
+    """Fit the normal of a plane to the points on it; False if they are no face of this width (rms)."""
     matrix, vectors, sums = np.empty((3, 3)), np.empty((3, 3)), np.empty(4)
-    offset, narrow = 0.0, 0.0
+    offset, narrow, beside = 0.0, 0.0, 0
     for _ in range(3):
         matrix[:] = 0.0
         sums[:] = 0.0
+        beside = 0
         for a in range(k):
             height = local[a, 0] * normal[0] + local[a, 1] * normal[1] + local[a, 2] * normal[2]
             if abs(height - offset) < tolerance:
@@ -143,6 +146,8 @@ def _fill_refined(local: FloatArray, k: int, width: float, tolerance: float, nor
                     sums[d] += local[a, d]
                     for e in range(3):
                         matrix[d, e] += local[a, d] * local[a, e]
+            elif abs(height - offset) < 2.0 * tolerance:
+                beside += 1
         if sums[3] < LEAST_ON_FACE:
             return False
         for d in range(3):
@@ -159,7 +164,7 @@ def _fill_refined(local: FloatArray, k: int, width: float, tolerance: float, nor
         for d in range(3):
             normal[d] = vectors[d, least]
             offset += normal[d] * sums[d] / sums[3]
-    return narrow >= width * width
+    return narrow >= width * width and beside <= MOST_BESIDE * sums[3]
 
 
 def _normals_of_windows(frame: Frame, flatness: FloatArray) -> FloatArray:
