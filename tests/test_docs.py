@@ -13,7 +13,7 @@ import yaml
 from cylx import errors
 from cylx.config import Config
 from cylx.evidence import weights as evidence_weights
-from cylx.io import annotated
+from cylx.io.annotated_columns import OURS
 from cylx.pipeline import candidates, rounds
 from cylx.records import Scene
 from cylx.scene import priors, resolve
@@ -220,7 +220,7 @@ def test_every_key_of_a_truth_is_told_of():
 
 def test_every_property_of_the_annotated_ply_is_told_of():
     told = part(read("docs/json-format.md"), "## The annotated PLY")
-    assert {row[0].strip("`") for row in rows_of(told)[1:]} == set(annotated._OURS)
+    assert {row[0].strip("`") for row in rows_of(told)[1:]} == set(OURS)
 
 
 # --- the method

@@ -11,7 +11,7 @@ import pytest
 
 from cylx.errors import InputError
 from cylx.io import read_cloud, write_annotated
-from cylx.io.annotated import las_obstacle
+from cylx.io.annotated_checks import las_obstacle
 
 CASES = Path(__file__).resolve().parents[2] / "shared" / "cases"
 if not CASES.exists() and os.environ.get("CI") != "true":

@@ -15,7 +15,7 @@ from cylx.api.warmup import compile_kernels
 from cylx.config import Config, load_config, named_options
 from cylx.io import Scratch, StreamedCloud, open_scratch, stream_arrays, stream_cloud
 from cylx.io.outputs import open_output
-from cylx.io.streamed import ROWS
+from cylx.io.streamed_cloud import ROWS
 from cylx.records import Crop, Observer, Selection, SilentObserver, TiledExtraction
 from cylx.tiles.run import Options, Outcome, extract_in_tiles
 from cylx.tiles.schedule import Cluster, Here, Runner

@@ -159,7 +159,8 @@ def document(
 ) -> Deviations:
     """Return the content of the JSON."""
     from cylx.deviation import check_deviation
-    from cylx.deviation.document import DesignFile, DeviationEntry, Deviations
+    from cylx.deviation.document import DesignFile, Deviations
+    from cylx.deviation.entries import DeviationEntry
     from cylx.io import recorded_name
     from cylx.results.parts import Input
 

@@ -139,6 +139,7 @@ class Study:
         UsageError
             If matplotlib is not installed.
         """
+        from cylx.cli.batch.workers import isolate_processes
         from cylx.cli.terminal.display import observed
         from cylx.experiments import draw, run_tasks, summarize, tasks_of
         from cylx.io import check_writable, write_bytes
@@ -152,12 +153,13 @@ class Study:
         with self.messages.progress() as observer, observed(observer, f"figure {figure.number}", len(tasks)):
             saved = monotonic()
             try:
-                for key, outcome in run_tasks(tasks, self.jobs, scan):
-                    done[key] = outcome
-                    observer.stage_advanced(1)
-                    if monotonic() - saved > SAVED_EVERY:
-                        self._write(table, done, made_by)
-                        saved = monotonic()
+                with isolate_processes():
+                    for key, outcome in run_tasks(tasks, self.jobs, scan):
+                        done[key] = outcome
+                        observer.stage_advanced(1)
+                        if monotonic() - saved > SAVED_EVERY:
+                            self._write(table, done, made_by)
+                            saved = monotonic()
             finally:
                 self._write(table, done, made_by)
         wanted = {key: outcome for key, outcome in done.items() if key.trial < self.trials}

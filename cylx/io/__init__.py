@@ -9,11 +9,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cylx.io.annotated import check_annotated as check_annotated
-    from cylx.io.annotated import las_obstacle as las_obstacle
     from cylx.io.annotated import write_annotated as write_annotated
     from cylx.io.annotated import write_annotated_stream as write_annotated_stream
     from cylx.io.annotated import write_trees as write_trees
+    from cylx.io.annotated_checks import check_annotated as check_annotated
+    from cylx.io.annotated_checks import las_obstacle as las_obstacle
     from cylx.io.clouds import cloud_suffixes as cloud_suffixes
     from cylx.io.clouds import read_cloud as read_cloud
     from cylx.io.clouds import recorded_name as recorded_name
@@ -35,23 +35,23 @@ if TYPE_CHECKING:
     from cylx.io.sizes import expected_points as expected_points
     from cylx.io.staging import remove_leftovers as remove_leftovers
     from cylx.io.staging import temporary_beside as temporary_beside
-    from cylx.io.streamed import StreamedCloud as StreamedCloud
     from cylx.io.streamed import stream_arrays as stream_arrays
     from cylx.io.streamed import stream_cloud as stream_cloud
+    from cylx.io.streamed_cloud import StreamedCloud as StreamedCloud
 
 _HOMES = {
     "Glance": "cylx.io.glance",
     "LAS_SUFFIXES": "cylx.io.formats",
     "Scratch": "cylx.io.scratch",
-    "StreamedCloud": "cylx.io.streamed",
-    "check_annotated": "cylx.io.annotated",
+    "StreamedCloud": "cylx.io.streamed_cloud",
+    "check_annotated": "cylx.io.annotated_checks",
     "check_writable": "cylx.io.outputs",
     "cloud_name": "cylx.io.formats",
     "cloud_suffix": "cylx.io.formats",
     "cloud_suffixes": "cylx.io.clouds",
     "expected_points": "cylx.io.sizes",
     "glance_at": "cylx.io.glance",
-    "las_obstacle": "cylx.io.annotated",
+    "las_obstacle": "cylx.io.annotated_checks",
     "open_scratch": "cylx.io.scratch",
     "printable": "cylx.io.inputs",
     "read_cloud": "cylx.io.clouds",

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-import io
 import shutil
-import struct
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
-from cylx.errors import OutputError
+from cylx.io.annotated_checks import check_annotated
+from cylx.io.annotated_columns import OF_RUNS, OF_TREES, OURS, kept_columns, rows_of
 from cylx.io.formats import LAS_SUFFIXES
-from cylx.io.inputs import excerpt
-from cylx.io.names import mended_names
 from cylx.io.outputs import open_output
 from cylx.io.pcd import write_pcd
-from cylx.io.ply import ROWS_AT_A_TIME, ply_type, write_ply
-from cylx.io.staging import known_name
+from cylx.io.ply import ROWS_AT_A_TIME, write_ply
 from cylx.palette import cylinder_colors
 
 if TYPE_CHECKING:
@@ -26,17 +22,10 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from cylx.io.streamed import StreamedCloud
+    from cylx.io.streamed_cloud import StreamedCloud
     from cylx.records import Extraction, PointCloud
 
     Labelled = Iterable[tuple[NDArray[np.int32], NDArray[np.float32]]]
-
-_TRIED = 3
-_MOST_STEPS = 4.0
-"""A coordinate in double precision may be off by this many steps of its file."""
-_OURS = {"cylinder_id": "<i4", "residual": "<f4", "red": "u1", "green": "u1", "blue": "u1"}
-_OF_RUNS = {"fitting_id": "<i4", "run_id": "<i4"}
-_OF_TREES = {"treeID": "<i4", "red": "u1", "green": "u1", "blue": "u1"}
 
 
 def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool = False) -> None:
@@ -75,8 +64,8 @@ def write_annotated(path: str | Path, extraction: Extraction, *, overwrite: bool
         if suffix in LAS_SUFFIXES:
             _write_las(file, extraction, compressed=suffix == ".laz")
             return
-        ours = _OURS if extraction.piping is None else _OURS | _OF_RUNS
-        kept = _kept(None if cloud.table is None else cloud.table.dtype, ours)
+        ours = OURS if extraction.piping is None else OURS | OF_RUNS
+        kept = kept_columns(None if cloud.table is None else cloud.table.dtype, ours)
         dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *ours.items()])
         if suffix == ".pcd":
             write_pcd(file, np.concatenate([*_blocks(extraction, kept, dtype)]))
@@ -106,8 +95,8 @@ def write_trees(path: str | Path, cloud: PointCloud, labels: NDArray[np.int32], 
     """
     check_annotated(path, cloud)
     suffix, columns, rows = Path(path).suffix.lower(), _columns(cloud), cloud.spread(labels, -1)
-    kept = _kept(None if cloud.table is None else cloud.table.dtype, _OF_TREES)
-    dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OF_TREES.items()])
+    kept = kept_columns(None if cloud.table is None else cloud.table.dtype, OF_TREES)
+    dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *OF_TREES.items()])
 
     def blocks(only: list[str] | None) -> Iterator[tuple[Any, dict[str, NDArray[Any]]]]:
         for start in range(0, len(rows), ROWS_AT_A_TIME):
@@ -126,94 +115,11 @@ def write_trees(path: str | Path, cloud: PointCloud, labels: NDArray[np.int32], 
                 file, cloud.source.header, len(rows), pieces, colored=colored, compressed=compressed, kinds=kinds
             )
             return
-        out = (_block(table, ours, kept, dtype, "treeID") for table, ours in blocks(list(kept)))
+        out = (rows_of(table, ours, kept, dtype, "treeID") for table, ours in blocks(list(kept)))
         if suffix == ".pcd":
             write_pcd(file, np.concatenate([*out]))
         else:
             write_ply(file, dtype, len(rows), out)
-
-
-def check_annotated(path: str | Path, cloud: PointCloud) -> None:
-    """Refuse a format that cannot hold the points of a cloud, before anything is computed for it.
-
-    Parameters
-    ----------
-    path : str or Path
-        Name of the annotated cloud.
-    cloud : PointCloud
-
-    Raises
-    ------
-    OutputError
-        If it is LAS or LAZ and the cloud is from neither, or PCD and a property is a list.
-    """
-    suffix = Path(path).suffix.lower()
-    if suffix in LAS_SUFFIXES and (cloud.source.header is None or cloud.table is None):
-        raise OutputError(known_name(path), "the input is neither LAS nor LAZ", "choose a name that ends in .ply")
-    obstacle = las_obstacle(path, cloud)
-    if obstacle:
-        raise OutputError(known_name(path), obstacle, "choose a name that ends in .ply")
-    if suffix == ".pcd" and cloud.table is not None:
-        dtype = cloud.table.dtype
-        lists = [name for name in dtype.names or () if dtype[name].kind == "O"]
-        if lists:
-            fault = f"PCD cannot hold the list property {excerpt(lists[0])}"
-            raise OutputError(known_name(path), fault, "choose a name that ends in .ply")
-
-
-def las_obstacle(path: str | Path, cloud: PointCloud) -> str:
-    """Return why a cloud from LAS or LAZ cannot be written as such again: tried with its first points.
-
-    Parameters
-    ----------
-    path : str or Path
-        Name of the annotated cloud.
-    cloud : PointCloud
-
-    Returns
-    -------
-    str
-        Empty if it can, or if it is to be written in another format, or is from neither.
-    """
-    header, table, suffix = cloud.source.header, cloud.table, Path(path).suffix.lower()
-    if suffix not in LAS_SUFFIXES or header is None or table is None:
-        return ""
-    from cylx.io.las_annotated import has_colors, write_las  # noqa: PLC0415  needs an extra, or for this alone
-
-    scales, offsets = struct.unpack_from("<3d", header, 131), struct.unpack_from("<3d", header, 155)
-    for axis, scale, offset in zip("xyz", scales, offsets, strict=True):
-        if np.spacing(max(np.abs(table[axis]).max(), abs(offset))) > _MOST_STEPS * abs(scale):
-            return f"the steps of {axis}, {scale:g}, are lost so far from the origin"
-    few = table[:_TRIED]
-    ours = {name: np.zeros(len(few), kind) for name, kind in (_OURS | _OF_RUNS).items()}
-    compressed, colored = suffix == ".laz", has_colors(few)
-    try:
-        write_las(io.BytesIO(), header, len(few), [(few, ours)], colored=colored, compressed=compressed, runs=True)
-    except MemoryError:
-        raise
-    except Exception as error:  # noqa: BLE001  laspy raises whatever it meets
-        fault = " ".join(str(error).split()) or type(error).__name__
-        return f"laspy cannot write this file again: {excerpt(fault, 100)}"
-    return ""
-
-
-def _kept(dtype: np.dtype[np.void] | None, ours: Mapping[str, str] = _OURS) -> dict[str, tuple[str, np.dtype[Any]]]:
-    """Return the output name and type of each property of the input, by its input name."""
-    if dtype is None:
-        return {axis: (axis, np.dtype("<f8")) for axis in "xyz"}
-    names = dtype.names or ()
-    mended = mended_names(names)
-    taken = {*mended, *ours}
-    colored = {"red", "green", "blue"} <= set(mended)
-    kept = {}
-    for name, new in zip(names, mended, strict=True):
-        renamed = new
-        if new in ours or (new == "alpha" and colored):
-            while renamed in taken:
-                renamed = f"orig_{renamed}"
-            taken.add(renamed)
-        kept[name] = (renamed, ply_type(dtype[name]))
-    return kept
 
 
 def _columns(cloud: PointCloud) -> Mapping[str, NDArray[Any]] | NDArray[np.void]:
@@ -228,7 +134,7 @@ def _blocks(
 ) -> Iterator[NDArray[np.void]]:
     columns = _columns(extraction.cloud)
     for part, ours in _findings(extraction):
-        yield _block({name: columns[name][part] for name in kept}, ours, kept, dtype)
+        yield rows_of({name: columns[name][part] for name in kept}, ours, kept, dtype)
 
 
 def _findings(extraction: Extraction) -> Iterator[tuple[slice, dict[str, NDArray[Any]]]]:
@@ -283,25 +189,9 @@ def write_annotated_stream(
                 file, cloud.source.header, cloud.rows, pieces, colored=colored, compressed=suffix == ".laz"
             )
             return
-        kept = _kept(None if cloud.bare else cloud.dtype)
-        dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *_OURS.items()])
-        write_ply(file, dtype, cloud.rows, (_block(table, ours, kept, dtype) for table, ours in pieces))
-
-
-def _block(
-    columns: Mapping[str, NDArray[Any]] | NDArray[np.void],
-    ours: dict[str, NDArray[Any]],
-    kept: dict[str, tuple[str, np.dtype[Any]]],
-    dtype: np.dtype[np.void],
-    one: str = "cylinder_id",
-) -> NDArray[np.void]:
-    """Return rows of the output; `one` is any of our properties."""
-    block = np.empty(len(ours[one]), dtype)
-    for name, (new, _) in kept.items():
-        block[new] = columns[name]
-    for name, values in ours.items():
-        block[name] = values
-    return block
+        kept = kept_columns(None if cloud.bare else cloud.dtype)
+        dtype = np.dtype([*((new, kind) for new, kind in kept.values()), *OURS.items()])
+        write_ply(file, dtype, cloud.rows, (rows_of(table, ours, kept, dtype) for table, ours in pieces))
 
 
 def _write_las(file: BinaryIO, extraction: Extraction, *, compressed: bool) -> None:

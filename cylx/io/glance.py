@@ -17,7 +17,7 @@ from cylx.io.names import coordinate_names
 from cylx.io.npy import columns_of, map_npy
 from cylx.io.ply import ply_layout
 from cylx.io.ply_header import read_header
-from cylx.io.streamed import opened
+from cylx.io.streamed_cloud import opened
 from cylx.optional.extras import require
 from cylx.records import PointCloud, Source
 

@@ -13,30 +13,20 @@ import os
 import queue
 import re
 import signal
-import subprocess
-import sys
-import tempfile
 import threading
-from contextlib import ExitStack, contextmanager, suppress
-from multiprocessing import spawn
-from pathlib import Path
+from contextlib import ExitStack, suppress
 from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
 from cylx.errors import InputError
+from cylx.io.isolated_start import LINUX, passed_on, readable, search_path, started, target_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from numpy.typing import NDArray
 
     from cylx.io.inputs import Input
 
-_START = (
-    "import json, sys; sys.path[:], *about = json.loads(sys.stdin.buffer.readline()); "
-    "from cylx.io.isolated_child import serve; serve(*about)"
-)
 _SECONDS, _BYTES_A_SECOND = 20, 250_000
 """Processor time that every file may take, and the bytes that are read in each further second, at the least."""
 _TABLE_A_SECOND = 1 << 23
@@ -50,7 +40,6 @@ _COPIES = 5
 _LEAST_TABLE, _MOST_EXPANSION = 1 << 30, 100
 """Bytes that the points may always take, and the multiple of the size of the file that they may take beyond."""
 _TYPE = re.compile(r"[<>|][iuf][1248]")
-_LINUX = sys.platform.startswith("linux")
 _REMEDY = "get a complete copy of the file, or convert it to PLY with other software"
 _REMEDY_OF_DESIGN = "export the file again, or give the cylinders as CSV"
 _NAMES = {"las": "LAS", "e57": "E57", "pcd": "PCD", "step": "STEP", "ifc": "IFC"}
@@ -79,7 +68,7 @@ def read_isolated(source: Input, kind: str, **wanted: int | None) -> NDArray[np.
     InputError
         If the reader refuses the file, dies, or takes more time or memory than a file of this size can need.
     """
-    with _readable(source) as file, Reader(kind, file) as reader:
+    with readable(source) as file, Reader(kind, file) as reader:
         return reader.read(source, **wanted)
 
 
@@ -101,7 +90,7 @@ def ask_isolated(source: Input, kind: str) -> dict[str, Any]:
     InputError
         As `read_isolated`.
     """
-    with _readable(source) as file, Reader(kind, file) as reader:
+    with readable(source) as file, Reader(kind, file) as reader:
         return reader.ask(source)
 
 
@@ -130,7 +119,7 @@ def spool_isolated(source: Input, kind: str, target: IO[bytes], **wanted: int | 
     OSError
         If the disk has no room for them.
     """
-    with _readable(source) as file, Reader(kind, file, target) as reader:
+    with readable(source) as file, Reader(kind, file, target) as reader:
         return reader.fill(source, **wanted)
 
 
@@ -157,11 +146,11 @@ class Reader:
     def __enter__(self) -> Reader:
         """Start the process."""
         with ExitStack() as stack:
-            self.target = self._given or stack.enter_context(_target())
-            names, fds = zip(*(stack.enter_context(_passed_on(one)) for one in (self.file, self.target)), strict=True)
-            self._process = stack.enter_context(_process([fd for fd in fds if fd is not None]))
+            self.target = self._given or stack.enter_context(target_file())
+            names, fds = zip(*(stack.enter_context(passed_on(one)) for one in (self.file, self.target)), strict=True)
+            self._process = stack.enter_context(started([fd for fd in fds if fd is not None]))
             self._target_name = names[1]
-            self._send([_search_path(), self.kind, os.getpid(), names[0]])
+            self._send([search_path(), self.kind, os.getpid(), names[0]])
             threading.Thread(target=self._listen, daemon=True).start()
             self._stack = stack.pop_all()
         return self
@@ -178,7 +167,7 @@ class Reader:
     def read(self, source: Input, **wanted: int | None) -> NDArray[np.void]:
         """Let the process read the points of the file; see `read_isolated`."""
         count, dtype = self.fill(source, **wanted)
-        if _LINUX:
+        if LINUX:
             return np.asarray(np.memmap(self.target, dtype, "c", shape=(count,)))
         self.target.seek(0)
         return np.fromfile(self.target, dtype, count)
@@ -269,79 +258,3 @@ class Reader:
         if os.fstat(self.target.fileno()).st_size != count * dtype.itemsize:
             raise RuntimeError(f"the table of {place} has not its size")
         return count, dtype
-
-
-@contextmanager
-def _process(fds: list[int]) -> Iterator[subprocess.Popen[bytes]]:
-    """Start a process that ignores the settings of Python in the environment; kill it at the end."""
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "2"}
-    command = [os.fsdecode(spawn.get_executable() or sys.executable), "-I", "-S", "-c", _START]
-    pipe, nothing = subprocess.PIPE, subprocess.DEVNULL
-    process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=nothing, pass_fds=fds, env=environment)
-    try:
-        yield process
-    finally:
-        process.kill()
-        process.wait()
-        for stream in (process.stdin, process.stdout):
-            with suppress(OSError):
-                if stream is not None:
-                    stream.close()
-
-
-@contextmanager
-def _target() -> Iterator[IO[bytes]]:
-    """Yield an empty file for the points: in memory on Linux where Python can, else on disk."""
-    if _LINUX:
-        in_memory = hasattr(os, "memfd_create")  # not in all builds of Python
-        with os.fdopen(os.memfd_create("cylx"), "r+b") if in_memory else tempfile.TemporaryFile() as file:
-            yield file
-        return
-    with tempfile.TemporaryDirectory(prefix="cylx-") as folder, (Path(folder) / "points").open("w+b") as file:
-        yield file
-
-
-@contextmanager
-def _readable(source: Input) -> Iterator[IO[bytes]]:
-    """Yield the file of an input as one that another process can open: on Linux any, elsewhere one with a name."""
-    if _LINUX:
-        yield source.file
-        return
-    if source.path is not None:
-        with source.path.open("rb") as file:
-            yield file
-        return
-    with tempfile.TemporaryDirectory(prefix="cylx-") as folder:
-        path = Path(folder) / "scan"
-        source.file.seek(0)
-        with path.open("wb") as copy:
-            while block := source.file.read(1 << 20):
-                copy.write(block)
-        with path.open("rb") as file:
-            yield file
-
-
-@contextmanager
-def _passed_on(file: IO[bytes]) -> Iterator[tuple[str, int | None]]:
-    """Yield the name of a file for the process, and the descriptor that it inherits for this; not one of 0 to 2."""
-    if not _LINUX:
-        yield str(Path(file.name).absolute()), None
-        return
-    import fcntl  # noqa: PLC0415  not on Windows
-
-    descriptor = file.fileno()
-    if descriptor > 2:
-        yield f"/proc/self/fd/{descriptor}", descriptor
-        return
-    descriptor = fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3)
-    try:
-        yield f"/proc/self/fd/{descriptor}", descriptor
-    finally:
-        os.close(descriptor)
-
-
-def _search_path() -> list[str]:
-    """Return where the process finds its modules: as here, but never in the current folder."""
-    home = str(Path(__file__).resolve().parents[2])
-    places = [str(place) for place in sys.path if place]
-    return places if home in places else [home, *places]

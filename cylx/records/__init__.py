@@ -9,16 +9,8 @@ from __future__ import annotations
 import warnings
 
 from cylx.records.candidates import Candidates, Cluster, EllipseFit, Slice
-from cylx.records.clouds import Frame, IndexedCloud, Noise, PointCloud, Scene, cell_keys
-from cylx.records.cylinders import (
-    CylinderFit,
-    Extraction,
-    Finding,
-    NominalRadius,
-    RejectedFit,
-    RejectedSegment,
-    Segment,
-)
+from cylx.records.clouds import PointCloud, Scene
+from cylx.records.cylinders import CylinderFit, Extraction, NominalRadius, RejectedFit
 from cylx.records.fittings import (
     Cap,
     Cross,
@@ -30,9 +22,11 @@ from cylx.records.fittings import (
     Junction,
     Reducer,
 )
+from cylx.records.frames import Frame, IndexedCloud, Noise, cell_keys
 from cylx.records.piping import Adjustment, OpenEnd, PipeRun, PipeSize, Piping
 from cylx.records.progress import Observer, SilentObserver, StageReport
 from cylx.records.scales import CELL, Explained, Nearby, Scale
+from cylx.records.segments import Finding, RejectedSegment, Segment
 from cylx.records.sources import Crop, Selection, Source
 from cylx.records.streams import stream
 from cylx.records.tiled import TiledExtraction, Tiling

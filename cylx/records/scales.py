@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.morton import cell_starts, group, pick_one
-from cylx.records.clouds import Frame
+from cylx.records.frames import Frame
 
 LEVELS_TO_BLOCK = 2
 """Levels from a voxel to the block of voxels that shows how many points a voxel should have."""

@@ -19,7 +19,8 @@ from cylx.fits.polish import move_to_foot, polish
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.kernels import njit
 from cylx.geometry.morton import cell_starts, gather_ball
-from cylx.geometry.patches import SIZE, TERMS, choose_patches, find_planar, fit_patches, osculating_of
+from cylx.geometry.patches import SIZE, TERMS, choose_patches, fit_patches, osculating_of
+from cylx.geometry.planar import find_planar
 from cylx.records import Candidates, Explained, Frame, Nearby, StageReport
 
 MOST_NOISE = 0.28

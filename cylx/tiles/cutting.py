@@ -11,7 +11,7 @@ import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.scratch import Scratch
-from cylx.io.streamed import StreamedCloud
+from cylx.io.streamed_cloud import StreamedCloud
 from cylx.records import Observer, Selection
 from cylx.scene import check_usable
 from cylx.tiles.search import margin_name, points_name, rows_name

@@ -12,7 +12,7 @@ from cylx.config import Config
 from cylx.errors import InputError
 from cylx.geometry.arrays import FloatArray
 from cylx.io.scratch import Scratch
-from cylx.io.streamed import StreamedCloud
+from cylx.io.streamed_cloud import StreamedCloud
 from cylx.records import CylinderFit, PointCloud, Scene, Source, StageReport
 from cylx.scene.cautions import damage
 from cylx.tiles.join import joined_name

@@ -13,7 +13,7 @@ import numpy as np
 from cylx.config import Config
 from cylx.errors import ConfigError, UsageError
 from cylx.io.scratch import Scratch
-from cylx.io.streamed import StreamedCloud
+from cylx.io.streamed_cloud import StreamedCloud
 from cylx.records import Observer, Selection, TiledExtraction, Tiling
 from cylx.scene import resolve
 from cylx.tiles.cutting import cut, stage, survey_once, tree_of

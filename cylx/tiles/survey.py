@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray, IndexArray
-from cylx.io.streamed import StreamedCloud
+from cylx.io.streamed_cloud import StreamedCloud
 from cylx.records import Selection
 from cylx.scene import rows_selected
 

@@ -68,6 +68,19 @@ def found_in_can(can):
     return find
 
 
+@pytest.fixture(scope="module")
+def found_in_pair(pair):
+    """What each method finds in the pair, told that there are two; run when asked for."""
+    found = {}
+
+    def find(method):
+        if method not in found:
+            found[method] = extract(pair[1], method=method, max_cylinders=2)
+        return found[method]
+
+    return find
+
+
 def errors(shape, true):
     angle = np.degrees(
         np.arctan2(np.linalg.norm(np.cross(shape.direction, true.direction)), abs(shape.direction @ true.direction))
@@ -107,9 +120,8 @@ def test_one_cylinder_is_found(can, found_in_can, method):
 
 
 @pytest.mark.parametrize("method", SEVERAL)
-def test_two_cylinders_are_found(pair, method):
-    truth, points = pair
-    found = extract(points, method=method, max_cylinders=2)
+def test_two_cylinders_are_found(pair, found_in_pair, method):
+    truth, found = pair[0], found_in_pair(method)
     shapes = sorted(shapes_of(found), key=lambda shape: -shape.radius)
     assert len(shapes) == 2
     for shape, true in zip(shapes, truth, strict=True):
@@ -235,9 +247,9 @@ def test_what_is_refused_does_not_count():
 
 
 @pytest.mark.parametrize("method", SEVERAL)
-@pytest.mark.parametrize("most", [1, 2])
-def test_no_more_cylinders_than_asked_for(pair, method, most):
-    assert len(extract(pair[1], method=method, max_cylinders=most).cylinders) == most
+def test_no_more_cylinders_than_asked_for(pair, found_in_pair, method):
+    assert len(extract(pair[1], method=method, max_cylinders=1).cylinders) == 1
+    assert len(found_in_pair(method).cylinders) == 2
 
 
 @pytest.mark.parametrize("method", METHODS)

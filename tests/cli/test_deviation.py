@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from cylx.errors import InputError
-from cylx.io import isolated, write_cloud
+from cylx.io import isolated, isolated_start, write_cloud
 from cylx.io.design import read_design
 from cylx.io.inputs import open_input
 from tests.support.tanks import DEPTH, tank
@@ -148,12 +148,12 @@ def test_what_native_code_reads_is_read_in_a_process_of_its_own(put, monkeypatch
 )
 def test_a_design_that_crashes_or_hangs_a_library_is_one_line(put, monkeypatch, code, fault):
     pytest.importorskip("ifcopenshell")
-    start = isolated._START.replace(
+    start = isolated_start.START.replace(
         "from cylx.io.isolated_child",
         f"import ctypes, cylx.io.design_ifc as d\ndef read_ifc(source):\n    {code}\nd.read_ifc = read_ifc\n"
         "from cylx.io.isolated_child",
     )
-    monkeypatch.setattr(isolated, "_START", start.replace("; import ctypes", "\nimport ctypes"))
+    monkeypatch.setattr(isolated_start, "START", start.replace("; import ctypes", "\nimport ctypes"))
     monkeypatch.setattr(isolated, "_SECONDS", 1)
     with open_input(put("a.ifc", "ISO-10303-21;")) as source, isolated.Reader("ifc", source.file) as reader:
         with pytest.raises(InputError) as refused:

@@ -69,7 +69,6 @@ def test_json_is_utf8_whatever_the_terminal_is(shell, encoding):
     assert json.loads(names.stdout.decode("utf-8"))["file"] == "ü😀.xyz"
 
 
-@pytest.mark.skipif(sys.version_info < (3, 11), reason="Python 3.10 looks into the current folder for each process")
 def test_modules_in_the_folder_of_the_scans_are_not_run(tmp_path):
     (tmp_path / "scans").mkdir()
     for seed in range(2):

@@ -5,7 +5,8 @@ import pytest
 
 from cylx.config import Config
 from cylx.geometry.morton import cell_starts
-from cylx.geometry.patches import SIZE, TERMS, choose_patches, find_planar, fit_patches
+from cylx.geometry.patches import SIZE, TERMS, choose_patches, fit_patches
+from cylx.geometry.planar import find_planar
 from cylx.scene import make_frame
 
 REACH = 2.6, 12.0

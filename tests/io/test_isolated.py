@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from cylx.errors import InputError
-from cylx.io import isolated
+from cylx.io import isolated, isolated_start
 from cylx.io.inputs import Input, open_input
+from cylx.io.isolated_start import readable
 from tests.support.kept_readers import KeptReaders
 from tests.support.patience import PATIENCE
 
@@ -38,13 +39,13 @@ def misled(monkeypatch):
             f"def read_las(source, *, allocate):\n{body}\n"
             "reader.read_las = read_las\nfrom cylx.io.isolated_child import serve; serve(*about)"
         )
-        monkeypatch.setattr(isolated, "_START", start)
+        monkeypatch.setattr(isolated_start, "START", start)
 
     return mislead
 
 
 def read(path):
-    with open_input(path) as source, isolated._readable(source) as file, isolated.Reader("las", file) as reader:
+    with open_input(path) as source, readable(source) as file, isolated.Reader("las", file) as reader:
         return reader.read(source)
 
 
@@ -85,12 +86,13 @@ def test_points_come_back_and_prints_do_not_disturb(scan, misled):
 
 
 def test_files_with_names_do_where_there_are_no_others(scan, misled, monkeypatch):
-    monkeypatch.setattr(isolated, "_LINUX", False)
+    for module in (isolated, isolated_start):
+        monkeypatch.setattr(module, "LINUX", False)
     misled("t = allocate(5, np.dtype([('x', 'f8')]))\nt['x'] = len(source.head(9))\nreturn t")
     assert read(scan)["x"].tolist() == [9.0] * 5
     with scan.open("rb") as file:
         source = Input("scan", file, 504, "")  # as unpacked from gzip
-        with isolated._readable(source) as copy, isolated.Reader("las", copy) as reader:
+        with readable(source) as copy, isolated.Reader("las", copy) as reader:
             assert len(reader.read(source)) == 5
 
 
@@ -120,10 +122,10 @@ def test_the_process_has_no_network_where_the_system_permits_it(scan, misled):
 def test_the_process_ends_with_the_one_that_waits_for_it(tmp_path, scan, how):
     code = f"""
 import sys
-from cylx.io import isolated
+from cylx.io import isolated, isolated_start
 sleep = "lambda *_, **__: (open({str(tmp_path / "pid")!r}, 'w').write(str(os.getpid())), time.sleep(6000))"
 code = "import os, time, cylx.io.las as reader\\nreader.read_las = " + sleep + "\\nfrom cylx"
-isolated._START = isolated._START.replace("from cylx", code)
+isolated_start.START = isolated_start.START.replace("from cylx", code)
 from cylx.io.inputs import Input, open_input
 with open_input({str(scan)!r}) as source:
     isolated.read_isolated(source, "las")

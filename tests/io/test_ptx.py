@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from cylx.errors import InputError
 from cylx.io import read_cloud, stream_cloud
-from cylx.io.streamed import ROWS
+from cylx.io.streamed_cloud import ROWS
 
 TURN = Rotation.from_euler("xyz", [0.1, -0.2, 2.0]).as_matrix()
 AT = np.array([500000.25, 5400000.5, 300.0])

@@ -11,8 +11,17 @@ import numpy as np
 import pytest
 
 from cylx.errors import InputError, OutputError
-from cylx.io import isolated, isolated_child, read_cloud, stream_arrays, stream_cloud, write_cloud
-from cylx.io import streamed as module
+from cylx.io import (
+    isolated,
+    isolated_child,
+    read_cloud,
+    stream_arrays,
+    stream_cloud,
+    streamed,
+    streamed_cloud,
+    streamed_formats,
+    write_cloud,
+)
 
 
 @pytest.fixture
@@ -22,7 +31,8 @@ def points():
 
 @pytest.fixture(autouse=True)
 def _small_pieces(monkeypatch):
-    monkeypatch.setattr(module, "ROWS", 300)
+    for module in (streamed, streamed_cloud, streamed_formats):
+        monkeypatch.setattr(module, "ROWS", 300)
 
 
 def same_as_whole(path, spool):
@@ -148,7 +158,7 @@ def test_e57_goes_from_its_process_to_the_disk(tmp_path, points, monkeypatch):
     one = stream_cloud(path, tmp_path / "spool", scan=1)
     assert (one.rows, one.source.selection.scan) == (600, 1)
     assert np.abs(one.coordinates(next(one.parts())) - points[400:700]).max() < 1e-6  # written in single precision
-    monkeypatch.setattr(isolated, "_target", None)  # nothing else takes the points
+    monkeypatch.setattr(isolated, "target_file", None)  # nothing else takes the points
     assert stream_cloud(path, tmp_path / "spool").rows == 1000
 
 
@@ -158,7 +168,7 @@ def test_a_disk_without_room_for_the_copy_is_told_of(tmp_path, points, monkeypat
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(module, "spool_cloud", full)
+    monkeypatch.setattr(streamed, "spool_cloud", full)
     with pytest.raises(OutputError, match="cannot be written: no space left; free some space"):
         stream_cloud(tmp_path / "scan.xyz", tmp_path / "spool")
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from cylx.config import Config
 from cylx.geometry.cells import Cells
 from cylx.records import IndexedCloud, Noise
-from cylx.records.clouds import ENOUGH_PATCHES, MOST_NOISE, cell_keys
+from cylx.records.frames import ENOUGH_PATCHES, MOST_NOISE, cell_keys
 from cylx.scene import make_frame, noise_by_place
 from cylx.scene.noise_variation import AGREED
 from cylx.synthetic import single

@@ -17,7 +17,7 @@ from cylx.synthetic import multi, single
 
 SAMPLE_DATA = Path(__file__).resolve().parents[2] / "sample_data"
 MAP = np.array([512345.678, 5412345.432, 123.4])
-SMALL = {"points": 10000, "planes": 1, "boxes": 1, "spheres": 1, "cones": 1}
+SMALL = {"points": 6000, "planes": 1, "boxes": 1, "spheres": 1, "cones": 1}
 SAMPLES = {
     "pipes.ply": lambda: SAMPLE_DATA / "pipes.ply",
     "a room": lambda: multi(**SMALL, cylinders=3, seed=2).points,

@@ -25,29 +25,29 @@ def rng():
 
 
 def test_a_pipe_over_five_tiles_is_one(rng, tmp_path):
-    long = ((0, 0, 0), (10, 0.3, 0.2), 0.1)
-    points = scene(rng, pipe(rng, *long, 7000), plane(rng, (0, -1, -0.5), (10, 1, -0.5), 4000))
-    extraction, labels, residuals = in_tiles(points, tmp_path, size=2.0)
+    long = ((0, 0, 0), (5, 0.15, 0.1), 0.1)
+    points = scene(rng, pipe(rng, *long, 3500), plane(rng, (0, -1, -0.5), (5, 1, -0.5), 1500))
+    extraction, labels, residuals = in_tiles(points, tmp_path, size=1.0)
     assert extraction.tiling.count >= 5
     assert extraction.tiling.joined == 1
     assert found_exactly(extraction, long) == []
     (fit,) = extraction.cylinders
-    assert fit.inliers == (labels == 0).sum() > 6700
+    assert fit.inliers == (labels == 0).sum() > 3350
     assert fit.rmse == pytest.approx(np.sqrt((residuals[labels == 0].astype(float) ** 2).mean()), rel=1e-4)
     assert np.isnan(residuals[labels < 0]).all()
     # a pipe five times as long is known as much better as all of its points say
-    part = cylx.extract(points[points[:, 0] < 2.0]).cylinders[0]
+    part = cylx.extract(points[points[:, 0] < 1.0]).cylinders[0]
     assert fit.angle_sd < 0.2 * part.angle_sd
     assert list(tmp_path.iterdir()) == []
 
 
 def test_tiles_and_no_tiles_say_the_same(rng, tmp_path):
     pieces = [
-        pipe(rng, (0, 1, 1), (8, 1.2, 1.1), 0.1, 5000),
-        pipe(rng, (4, 0, 2), (4, 4, 2), 0.15, 4000, np.pi),
-        pipe(rng, (2, 2, 0), (2, 2, 3), 0.2, 4000),
-        pipe(rng, (6, 3, 0.5), (7, 3, 0.5), 0.08, 2000),
-        plane(rng, (0, 0, 0), (8, 4, 0), 6000),
+        pipe(rng, (0, 1, 1), (6, 1.2, 1.1), 0.1, 3000),
+        pipe(rng, (4, 0, 2), (4, 4, 2), 0.15, 3000, np.pi),
+        pipe(rng, (2, 2, 0), (2, 2, 3), 0.2, 3000),
+        pipe(rng, (5, 3, 0.5), (6, 3, 0.5), 0.08, 1000),
+        plane(rng, (0, 0, 0), (6, 4, 0), 3000),
     ]
     points = scene(rng, *pieces)
     whole = cylx.extract(points)
@@ -78,9 +78,9 @@ def test_pipes_that_cross_on_a_corner(rng, tmp_path):
 
 
 def test_a_tank_larger_than_a_tile(rng, tmp_path):
-    tank, thin = ((3.5, 3.5, 0), (3.5, 3.5, 4), 2.0), ((0, 0, 1), (7, 0, 1), 0.1)
-    floor = plane(rng, (0, 0, 0), (7, 7, 0), 2000)
-    points = scene(rng, pipe(rng, *tank, 7000), pipe(rng, *thin, 2500), floor)
+    tank, thin = ((3, 3, 0), (3, 3, 4), 1.75), ((0, 0, 1), (5.5, 0, 1), 0.1)
+    floor = plane(rng, (0, 0, 0), (5.5, 5.5, 0), 1500)
+    points = scene(rng, pipe(rng, *tank, 5000), pipe(rng, *thin, 2000), floor)
     extraction, *_ = in_tiles(points, tmp_path, size=2.0)
     assert evaluate(truth(tank, thin), document(extraction)).f1 == 1.0
     assert found_exactly(extraction, tank, thin) == []
@@ -112,14 +112,14 @@ def test_strays_far_away(rng, tmp_path):
 
 
 def test_the_number_of_points_cuts_where_they_are_dense(rng, tmp_path, monkeypatch):
-    long, short = ((0, 0, 0), (8, 0, 0), 0.1), ((3, 0.8, 0), (4, 0.8, 0), 0.1)
-    points = scene(rng, pipe(rng, *long, 3000), pipe(rng, *short, 3000))
-    extraction, labels, _ = in_tiles(points, tmp_path, most=2000, monkeypatch=monkeypatch)
+    long, short = ((0, 0, 0), (4, 0, 0), 0.1), ((1.5, 0.8, 0), (2, 0.8, 0), 0.1)
+    points = scene(rng, pipe(rng, *long, 1500), pipe(rng, *short, 1500))
+    extraction, labels, _ = in_tiles(points, tmp_path, most=1000, monkeypatch=monkeypatch)
     assert extraction.tiling.count >= 4
-    assert extraction.tiling.most_points <= 2000
+    assert extraction.tiling.most_points <= 1000
     assert extraction.tiling.size is None
     assert found_exactly(extraction, long, short) == []
-    again = in_tiles(points, tmp_path, most=2000, monkeypatch=monkeypatch)
+    again = in_tiles(points, tmp_path, most=1000, monkeypatch=monkeypatch)
     assert document(again[0]) == document(extraction)
     assert (again[1] == labels).all()
 

@@ -1,19 +1,14 @@
-"""The output files of a run: name them, check that none is in the way, and write them together."""
+"""The output files of a run: name them, and check that none is in the way."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cylx.errors import OutputError, UsageError
 from cylx.io.outputs import STANDARD_OUTPUT, STREAM
-
-if TYPE_CHECKING:
-    from cylx.records import Extraction
-    from cylx.results import Result
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
 REPORT, PICTURE, MESH = ".report.html", ".cylinders.png", ".cylinders.obj"
@@ -67,25 +62,6 @@ class Job:
     def written(self, found: int) -> list[str]:
         """Return the files written for this number of cylinders; without cylinders there is no mesh."""
         return [name for name in self.outputs if found or name != self.mesh]
-
-
-@dataclass(frozen=True)
-class Written:
-    """What was written for one scan.
-
-    Parameters
-    ----------
-    job : Job
-        With the outputs that exist now.
-    remarks : list of str
-        Remarks for the reader of the mesh.
-    failed : dict of str to Exception
-        What went wrong with the other outputs, by name.
-    """
-
-    job: Job
-    remarks: list[str]
-    failed: dict[str, Exception]
 
 
 def plan_jobs(
@@ -179,76 +155,6 @@ def check_outputs(jobs: Sequence[Job], others: Sequence[str], *, overwrite: bool
     names = [name for job in jobs if _is_there(job.scan) for name in job.outputs]
     for name in [*names, *others]:
         check_writable(name, overwrite=overwrite)
-
-
-def mesh_bytes(job: Job, content: Result) -> tuple[bytes | None, list[str]]:
-    """Make the requested mesh, with remarks for its reader."""
-    if job.mesh is None:
-        return None, []
-    from cylx.cli.batch.meshes import mesh_of
-
-    return mesh_of(job.mesh, content)
-
-
-def write_job(job: Job, extraction: Extraction, *, overwrite: bool) -> Written:
-    """Write the JSON of one scan, and the other requested outputs; the JSON is kept if one of them fails.
-
-    Raises
-    ------
-    OutputError
-        If the JSON cannot be written, or another program has written one of the outputs meanwhile. Then there is none.
-    """
-    from cylx.io import write_text
-    from cylx.io.outputs import write_beside
-    from cylx.results import Result
-
-    content = Result.of(extraction)
-    remarks: list[str] = []
-    others = _writers(job, extraction, content, remarks, overwrite=overwrite)
-    main = (job.result, lambda path: write_text(path, content.to_json(), overwrite=overwrite))
-    failed = write_beside(main, others, overwrite=overwrite)
-    if job.mesh is not None and job.mesh not in others:
-        remarks.append(f"{job.mesh}: not written, as there are no cylinders")
-        Path(job.mesh).unlink(missing_ok=True)  # an old mesh does not belong to this result
-    return Written(job.without(failed), remarks, failed)
-
-
-def _writers(
-    job: Job, extraction: Extraction, content: Result, remarks: list[str], *, overwrite: bool
-) -> dict[str, Callable[[str | Path], None]]:
-    """Return what writes each requested output but the JSON; writing the mesh adds remarks for its reader."""
-    from cylx.io import write_annotated, write_bytes, write_text
-
-    def reject(path: str | Path) -> None:
-        from cylx.results import Rejections
-
-        write_text(path, Rejections.of(extraction).to_json(), overwrite=overwrite)
-
-    def show(path: str | Path) -> None:
-        from cylx.report import html_of
-
-        write_text(path, html_of(extraction), overwrite=overwrite)
-
-    def draw(path: str | Path) -> None:
-        from cylx.report import png_of
-
-        write_bytes(path, png_of(extraction), overwrite=overwrite)
-
-    def mesh(path: str | Path) -> None:
-        from cylx.cli.batch.meshes import mesh_of
-
-        data, said = mesh_of(str(job.mesh), content)
-        remarks.extend(said)
-        write_bytes(path, data or b"", overwrite=overwrite)
-
-    writers = (
-        (job.annotated, lambda path: write_annotated(path, extraction, overwrite=overwrite)),
-        (job.rejected, reject),
-        (job.report, show),
-        (job.picture, draw),
-        (job.mesh if content.cylinders else None, mesh),
-    )
-    return {name: write for name, write in writers if name is not None}
 
 
 def _plan(scan: str, output: str | None, annotate: bool | None, annotated: str | None) -> Job:

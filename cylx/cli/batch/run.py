@@ -6,9 +6,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from cylx.cli.batch.annotated import check_format
-from cylx.cli.batch.jobs import Job, write_job
+from cylx.cli.batch.jobs import Job
 from cylx.cli.batch.meshes import check_unit
 from cylx.cli.batch.outcomes import Finished, Outcome, check_finished, failed_outcome, failure_of
+from cylx.cli.batch.writing import write_job
 from cylx.cli.options.tiles import NO_TILES, TileOptions
 from cylx.cli.terminal.failures import blamed_on
 from cylx.cli.terminal.signals import Listener, check_heard

@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from cylx.cli.batch.found import report
-from cylx.cli.batch.jobs import MESH, RESULT, Job, is_folder, mesh_bytes, plan_jobs
+from cylx.cli.batch.jobs import MESH, RESULT, Job, is_folder, plan_jobs
 from cylx.cli.batch.memory import cores, free_memory, memory_needed
 from cylx.cli.batch.outcomes import Finished
 from cylx.cli.batch.tile_workers import runner_of
+from cylx.cli.batch.writing import mesh_bytes
 from cylx.cli.options.tiles import AUTO, TileOptions
 from cylx.cli.terminal.signals import Listener, check_heard
 from cylx.cli.terminal.stopwatch import Stopwatch
@@ -222,7 +223,7 @@ def _write(jobs: Sequence[Job], clouds: Sequence[StreamedCloud], outcome: Outcom
     """Write the JSON, the annotated clouds and the mesh, all or nothing."""
     from cylx.io import write_annotated_stream, write_bytes, write_text
     from cylx.io.outputs import all_or_none
-    from cylx.io.streamed import ROWS
+    from cylx.io.streamed_cloud import ROWS
     from cylx.results import Result
 
     extraction, labels, job = outcome.extraction, outcome.labels, jobs[0]

@@ -10,6 +10,7 @@ import errno
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -194,7 +195,7 @@ class _Worker:
         self.pipe, theirs = context.Pipe()
         self.process = context.Process(target=_serve, args=(theirs, work), daemon=True)
         try:
-            with _ctrl_c_kept_back():
+            with isolate_processes(), _ctrl_c_kept_back():
                 self.process.start()
         except OSError:
             self.pipe.close()
@@ -202,6 +203,27 @@ class _Worker:
         finally:
             theirs.close()  # so that the pipe closes when the process ends
         self.pid = self.process.pid or 0
+
+
+@contextmanager
+def isolate_processes() -> Iterator[None]:
+    """Let processes that multiprocessing starts meanwhile look for no modules in the current folder, with Python 3.10.
+
+    They look there for their first modules, before they are told the places that this process knows, and it may be full
+    of files of others. Newer versions of Python know PYTHONSAFEPATH, which the command line sets.
+    """
+    if sys.version_info >= (3, 11):
+        yield
+        return
+    from multiprocessing import util
+
+    name = "_args_from_interpreter_flags"
+    flags = vars(util)[name]
+    setattr(util, name, lambda: [*dict.fromkeys([*flags(), "-I"])])
+    try:
+        yield
+    finally:
+        setattr(util, name, flags)
 
 
 @contextmanager

@@ -52,7 +52,7 @@ def own_process() -> Iterator[None]:
     os.environ.pop("NUMBA_DISABLE_JIT", None)  # without compiling, a scan would take days
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # processes that are started look for no modules in the current folder, which may be full of files of others; they
-    # are told where the modules are (Python 3.10 does not know this variable)
+    # are told where the modules are (for Python 3.10, which does not know this variable, see `isolate_processes`)
     os.environ.setdefault("PYTHONSAFEPATH", "1")
     try:
         yield

@@ -110,16 +110,16 @@ def test_ctrl_c_leaves_whole_files_only(place, whole, started):
 
 
 @POSIX
-def test_what_was_killed_goes_on_to_the_same_bytes(place, whole, started):
+def test_what_was_killed_goes_on_to_the_same_bytes(run_cylx, place, whole, started, monkeypatch):
     process = started("killed")
     process.kill()
     process.communicate(timeout=PATIENCE)  # the others hold its standard error, and end when they see that it is gone
     left = contents(place / "killed")
     assert 0 < len(left) < len(whole)
     assert left.items() <= whole.items()
-    options = ["--jobs", "2", "--resume"]
-    done = subprocess.run(command(place, "killed", *options), cwd=place, capture_output=True, check=False, text=True)
-    assert done.returncode == 6
+    monkeypatch.chdir(place)
+    done = run_cylx("extract", "scans", "--out-dir", place / "killed", "--resume")
+    assert done.exit_code == 6
     assert int(done.stderr.splitlines()[-2].split()[3]) > 0
     assert contents(place / "killed") == whole
 
