@@ -13,7 +13,7 @@ import numpy as np
 
 from cylx.records import PointCloud
 from cylx.stems import find_stems
-from cylx.synthetic.forest import forest
+from cylx.synthetic.stand import forest
 
 LEAST_DBH, LEAST_ARC = 0.10, math.radians(90.0)
 SAME_PLACE = 0.15

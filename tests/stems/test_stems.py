@@ -8,7 +8,7 @@ import pytest
 from cylx.records import PointCloud
 from cylx.stems import find_stems
 from cylx.stems.rings import fit_ring
-from cylx.synthetic.forest import forest
+from cylx.synthetic.stand import forest
 
 SIDE = 8.0
 
