@@ -49,7 +49,7 @@ class Comparison:
     residuals: FloatArray
 
     def __repr__(self) -> str:
-        return f"Comparison({counted(len(self.deviations), 'cylinder')}, {self.verdict})"
+        return f"Comparison({counted(len(self.deviations))}, {self.verdict})"
 
     @property
     def checks(self) -> tuple[tuple[Check, ...], ...]:

@@ -27,6 +27,9 @@ ON = 3.0
 """Points within so many deviations are on the ring."""
 LEAST_POINTS = 12
 SETTLED = 1e-4
+FORM = tuple(0.01 * (2.0 / n) ** 2 for n in range(2, 7))
+"""Usual waves of two, three ... periods about a stem, standard deviations of their cosine and sine, in radii: an oval
+whose diameters differ by some percent. Noise hides them, and they count where not all sides are seen."""
 EVEN = 0.2
 """A sector with less than this share of the usual points does not weigh as much as the others."""
 OVAL_ARC = 1.5 * math.pi
@@ -140,7 +143,8 @@ def _measured(
     contrast = count / max(1, count + inside + outside)
     white = EFFICIENCY * deviation**2 * float((influence**2).sum())
     common = shared_variance(heights[on], residuals[on], angles[on], radius, influence) if shared else None
-    variance = white + (0.0 if common is None else common)
+    form = _variance_by_form(angles[on], influence, radius)
+    variance = white + max(form, 0.0 if common is None else common)
     scatter = _scatter(residuals[on], heights[on], place[on])
     radius -= min(scatter**2 / (2.0 * radius), 0.3 * radius)
     if not (radius > 0.0 and math.isfinite(variance)):
@@ -157,6 +161,13 @@ def _influence_on_circle(angles: FloatArray, place: IndexArray, counts: IndexArr
     rows = np.stack([np.cos(angles), np.sin(angles), np.ones_like(angles)], axis=1)
     inverse = np.linalg.pinv(np.einsum("ia,ib,i->ab", rows, rows, weights), hermitian=True)
     return np.asarray(np.einsum("a,ia->i", inverse[2], rows) * weights)
+
+
+def _variance_by_form(angles: FloatArray, influence: FloatArray, radius: float) -> float:
+    """Return the variance of the radius that the usual form of stems gives: none if all sides are seen."""
+    waves = np.arange(2, 2 + len(FORM))
+    sums = np.exp(1j * np.outer(waves, angles)) @ influence
+    return float((radius**2 * np.array(FORM) ** 2 * np.abs(sums) ** 2).sum())
 
 
 def _scatter(residuals: FloatArray, heights: FloatArray, place: IndexArray) -> float:
