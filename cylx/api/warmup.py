@@ -182,16 +182,17 @@ def practise_the_end() -> None:
     log, count = StageLog(SilentObserver()), len(cloud.points)
     explained = Explained(np.zeros(count), np.zeros(count, np.bool_))
     indexed = IndexedCloud.of(prepared.frame, explained.flatness)
-    # about as much as the other process compiles before it gets here, what it needs first at the beginning
+    # in an order in which neither process compiles what the other one is at: what windows and clusters are fitted by is
+    # compiled by the other one at its beginning, so they come after the rims
     find_rims(prepared.frame, np.array([[0.0, 0.0, 1.0]]), _practice_normals(prepared.frame), prepared.radii, 1)
-    ellipses = ellipses_of_slices(prepared, cut_slices(prepared, explained.flatness, log), log)
-    candidates_of_slices(prepared, ellipses, log)
-    candidates_of_windows(prepared, explained, log)
     candidates = _practice_candidates(prepared.frame)
     rounds = Rounds(prepared, indexed, CandidateGame(candidates, config.clustering, 1), candidates)
     for clusters in rounds.clusters(log):
         rounds.verify(rounds.fit(clusters), log)
     assemble(prepared, indexed, rounds.merge(log), rounds.rejected, log.reports)
+    ellipses = ellipses_of_slices(prepared, cut_slices(prepared, explained.flatness, log), log)
+    candidates_of_slices(prepared, ellipses, log)
+    candidates_of_windows(prepared, explained, log)
 
 
 def _practice_frame(points: FloatArray) -> Frame:
