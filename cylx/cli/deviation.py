@@ -87,10 +87,9 @@ def deviation(
     check_apart([scan, design], outputs)
     for name in outputs:
         check_writable(name, overwrite=overwrite)
-    chosen = {name: getattr(selection, name) for name in ("crop", "voxel", "every", "classes", "scan")}
-    found = measure_deviations(
-        scan, design, **tolerances, within=within, cell=cell, units=units, design_units=design_units, **chosen
-    )
+    options: dict[str, Any] = {**tolerances, "within": within, "cell": cell}
+    options |= {name: getattr(selection, name) for name in ("crop", "voxel", "every", "classes", "scan")}
+    found = measure_deviations(scan, design, units=units, design_units=design_units, **options)
     content = found.to_document()
     _write(content, found, (output, report, junit_file), (scan, design), overwrite=overwrite)
     if as_json:
