@@ -18,10 +18,13 @@ if TYPE_CHECKING:
     from cylx.api import read_result as read_result
     from cylx.api import to_dataframe as to_dataframe
     from cylx.api import to_dict as to_dict
+    from cylx.api.deviations import measure_deviations as measure_deviations
     from cylx.api.piping import find_runs as find_runs
+    from cylx.api.stems import find_stems as find_stems
     from cylx.api.tiled import extract_tiled as extract_tiled
     from cylx.config import Config as Config
     from cylx.config import load_config as load_config
+    from cylx.deviation import Comparison as Comparison
     from cylx.errors import CylxError as CylxError
     from cylx.evaluation import compare as compare
     from cylx.geometry.cylinder import Cylinder as Cylinder
@@ -33,6 +36,8 @@ if TYPE_CHECKING:
     from cylx.records import PointCloud as PointCloud
     from cylx.records import RejectedFit as RejectedFit
     from cylx.records import TiledExtraction as TiledExtraction
+    from cylx.records.stems import Stem as Stem
+    from cylx.records.stems import StemPlot as StemPlot
     from cylx.report import plot_radii as plot_radii
     from cylx.report import plot_residuals as plot_residuals
     from cylx.report import plot_scene as plot_scene
@@ -40,6 +45,7 @@ if TYPE_CHECKING:
     from cylx.results import Result as Result
 
 _HOMES = {
+    "Comparison": "cylx.deviation",
     "Config": "cylx.config",
     "Cylinder": "cylx.geometry.cylinder",
     "CylinderFit": "cylx.records",
@@ -48,14 +54,18 @@ _HOMES = {
     "PointCloud": "cylx.records",
     "RejectedFit": "cylx.records",
     "Result": "cylx.results",
+    "Stem": "cylx.records.stems",
+    "StemPlot": "cylx.records.stems",
     "TiledExtraction": "cylx.records",
     "compare": "cylx.evaluation",
     "evaluate": "cylx.api",
     "extract": "cylx.api",
     "extract_tiled": "cylx.api.tiled",
     "find_runs": "cylx.api.piping",
+    "find_stems": "cylx.api.stems",
     "fit_cylinder": "cylx.pipeline.segmented",
     "load_config": "cylx.config",
+    "measure_deviations": "cylx.api.deviations",
     "plot_radii": "cylx.report",
     "plot_residuals": "cylx.report",
     "plot_scene": "cylx.report",

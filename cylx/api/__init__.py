@@ -7,15 +7,15 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cylx.api.clouds import chosen_cloud
 from cylx.api.warmup import compile_kernels
 from cylx.config import Config, Given, check_tolerance, load_config, named_options
 from cylx.evaluation import Evaluation
 from cylx.evaluation import evaluate as evaluate_documents
-from cylx.io import read_cloud, read_json
+from cylx.io import read_json
 from cylx.pipeline import extract_cylinders
-from cylx.records import Crop, Extraction, Observer, PointCloud, Selection, SilentObserver
+from cylx.records import Crop, Extraction, Observer, PointCloud, SilentObserver
 from cylx.results import Result
-from cylx.scene import select
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -147,26 +147,15 @@ def extract(
         options=options,
     )
     check_tolerance(settings, options)
-    chosen = None if classes is None else tuple(classes)
-    selection = Selection(crop=crop, voxel=voxel, every=every, classes=chosen, scan=scan)
-    cloud = _cloud_of(points_or_path, scan)
+    cloud = chosen_cloud(points_or_path, crop=crop, voxel=voxel, every=every, classes=classes, scan=scan)
     observer = observer or SilentObserver()
     compile_kernels(observer)
-    found = extract_cylinders(select(cloud, selection), settings, threads=threads, observer=observer)
+    found = extract_cylinders(cloud, settings, threads=threads, observer=observer)
     if not runs:
         return found
     from cylx.api.piping import find_runs  # noqa: PLC0415  for this alone
 
     return find_runs(found, observer=observer)
-
-
-def _cloud_of(given: ArrayLike | PointCloud | str | PathLike[str], scan: int | None) -> PointCloud:
-    """Return the cloud that was given, in whatever form."""
-    if isinstance(given, str | PathLike):
-        return read_cloud(Path(given), scan=scan)
-    if scan is not None:
-        raise ValueError("scan needs a file, and an array was given")
-    return given if isinstance(given, PointCloud) else PointCloud.from_array(given)
 
 
 def read_result(path: str | PathLike[str]) -> Result:

@@ -32,12 +32,24 @@ from cylx.geometry.kernels import (
 from cylx.geometry.morton import find_cell, morton_codes
 from cylx.pipeline import extract_cylinders
 from cylx.pipeline.assembly import assemble
-from cylx.pipeline.candidates import candidates_of_windows
+from cylx.pipeline.candidates import candidates_of_slices, candidates_of_windows, cut_slices, ellipses_of_slices
 from cylx.pipeline.rounds import Rounds
 from cylx.pipeline.stage_log import StageLog
-from cylx.records import Candidates, Explained, Frame, IndexedCloud, Noise, Observer, PointCloud, Scene, SilentObserver
+from cylx.records import (
+    Candidates,
+    Explained,
+    Frame,
+    IndexedCloud,
+    Nearby,
+    Noise,
+    Observer,
+    PointCloud,
+    Scene,
+    SilentObserver,
+)
 from cylx.scene import Prepared, resolve
 from cylx.stages.clustering import CandidateGame
+from cylx.stages.rims import find_rims
 
 SPACING, SIGMA = 0.1, 0.005
 LEVEL = 16
@@ -162,7 +174,7 @@ def second_process() -> Iterator[None]:
 
 
 def practise_the_end() -> None:
-    """Go through the method from the game on, and through local slices, with candidates that are known."""
+    """Go through what comes late in the method: rims, slices, local slices, and the game with known candidates."""
     scene = Scene(SPACING, SIGMA, 16.0)
     config = resolve(Config(), scene)
     cloud = PointCloud(practice_cloud())
@@ -170,11 +182,16 @@ def practise_the_end() -> None:
     log, count = StageLog(SilentObserver()), len(cloud.points)
     explained = Explained(np.zeros(count), np.zeros(count, np.bool_))
     indexed = IndexedCloud.of(prepared.frame, explained.flatness)
+    # in an order in which neither process compiles what the other one is at: what windows and clusters are fitted by is
+    # compiled by the other one at its beginning, so they come after the rims
+    find_rims(prepared.frame, np.array([[0.0, 0.0, 1.0]]), _practice_normals(prepared.frame), prepared.radii, 1)
     candidates = _practice_candidates(prepared.frame)
     rounds = Rounds(prepared, indexed, CandidateGame(candidates, config.clustering, 1), candidates)
     for clusters in rounds.clusters(log):
         rounds.verify(rounds.fit(clusters), log)
     assemble(prepared, indexed, rounds.merge(log), rounds.rejected, log.reports)
+    ellipses = ellipses_of_slices(prepared, cut_slices(prepared, explained.flatness, log), log)
+    candidates_of_slices(prepared, ellipses, log)
     candidates_of_windows(prepared, explained, log)
 
 
@@ -187,6 +204,18 @@ def _practice_frame(points: FloatArray) -> Frame:
     noise = Noise(np.array([1.0, 10.0]), np.full(2, SIGMA / SPACING))
     inside = np.ascontiguousarray(((points - corner) / SPACING)[order])
     return Frame(inside, order, codes[order], unit, LEVEL, 6.0 * unit * 2.0**LEVEL, noise, corner, SPACING)
+
+
+def _practice_normals(frame: Frame) -> Nearby:
+    """Return the normals of the cylinders of the practice cloud, and of its floor."""
+    places = frame.points * frame.spacing + frame.origin
+    normals = np.zeros(places.shape, np.float32)
+    middles = np.where(places[:, 0] > 2.0, 4.0, 0.0)
+    normals[:, :2] = places[:, :2] - np.column_stack([middles, np.zeros(len(places))])
+    on_floor = np.abs(places[:, 2]) < 4.0 * SIGMA
+    normals[on_floor] = (0.0, 0.0, 1.0)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Nearby(normals, np.arange(len(places)), on_floor)
 
 
 def _practice_candidates(frame: Frame) -> Candidates:

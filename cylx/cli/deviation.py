@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,14 +14,12 @@ from cylx.cli.options.selection import selecting
 from cylx.cli.options.units import UNITS, units_option
 from cylx.cli.terminal.failures import answer, tell
 from cylx.cli.terminal.group import ExampleCommand
-from cylx.errors import UsageError
 from cylx.wording import number
 
 if TYPE_CHECKING:
-    from cylx.deviation import Deviation, Tolerances
+    from cylx.deviation import Comparison
     from cylx.deviation.document import Deviations
-    from cylx.records import PointCloud, Selection
-    from cylx.records.designs import Design
+    from cylx.records import Selection
 
 _LENGTH = NumberRange(min=0)
 _SIZE = NumberRange(min=0, min_open=True)
@@ -83,28 +80,18 @@ def deviation(
     those of the design are converted. The exit code is 1 if a cylinder was not found or is out of a tolerance for
     certain, that is by more than two standard deviations.
     """
-    from cylx.deviation import Tolerances, measure_deviations, shapes_of
-    from cylx.io import check_writable, read_cloud
-    from cylx.io.design import read_design
-    from cylx.scene import select
+    from cylx.api.deviations import measure_deviations
+    from cylx.io import check_writable
 
     outputs = [name for name in (output, report, junit_file) if name is not None]
     check_apart([scan, design], outputs)
     for name in outputs:
         check_writable(name, overwrite=overwrite)
-    drawn = read_design(design)
-    if design_units is not None:
-        drawn = with_units(drawn, design_units, design)
-    cloud = select(read_cloud(scan, scan=selection.scan, units=units), selection)
-    scale = scale_of(drawn, cloud, design)
-    shapes = shapes_of(drawn, scale)
-    limits = Tolerances(**tolerances)
-    depth = 0.0 if limits.dent is None else 0.5 * limits.dent
-    found, labels, residuals = measure_deviations(cloud.points, shapes, within=within, cell=cell, least_depth=depth)
-    content = document(cloud, drawn, design, scale, limits, found)
-    _write(
-        content, cloud, (found, labels, residuals), (output, report, junit_file), (scan, design), overwrite=overwrite
-    )
+    options: dict[str, Any] = {**tolerances, "within": within, "cell": cell}
+    options |= {name: getattr(selection, name) for name in ("crop", "voxel", "every", "classes", "scan")}
+    found = measure_deviations(scan, design, units=units, design_units=design_units, **options)
+    content = found.to_document()
+    _write(content, found, (output, report, junit_file), (scan, design), overwrite=overwrite)
     if as_json:
         answer(json.dumps(content.to_object(), indent=2, ensure_ascii=False) + "\n", as_json=True)
     else:
@@ -113,68 +100,9 @@ def deviation(
         raise click.exceptions.Exit(1)
 
 
-def with_units(drawn: Design, units: str, place: str) -> Design:
-    """Return a design whose unit is given.
-
-    Raises
-    ------
-    UsageError
-        If the file says another.
-    """
-    from cylx.units import METRES
-
-    if drawn.units not in {None, units}:
-        raise UsageError("--design-units", f"{place} is in {drawn.units}", "leave it out")
-    return replace(drawn, units=units, metres=METRES[units])
-
-
-def scale_of(drawn: Design, cloud: PointCloud, place: str) -> float:
-    """Return what the lengths of a design are multiplied by, to be in the unit of the scan.
-
-    Raises
-    ------
-    UsageError
-        If the design says its unit, and the scan does not.
-    """
-    from cylx.units import METRES
-
-    if drawn.metres is None:
-        return 1.0
-    if cloud.source.units is None:
-        if drawn.format == "json":
-            return 1.0
-        fault = f"has a unit, {drawn.units or f'{drawn.metres:g} m'}, and the scan says none"
-        raise UsageError(place, fault, "give that of the scan by --units")
-    ratio = drawn.metres / METRES[cloud.source.units]
-    return 1.0 if abs(ratio - 1.0) < 1e-9 else ratio
-
-
-def document(
-    cloud: PointCloud,
-    drawn: Design,
-    design: str,
-    scale: float,
-    limits: Tolerances,
-    found: list[Deviation],
-) -> Deviations:
-    """Return the content of the JSON."""
-    from cylx.deviation import check_deviation
-    from cylx.deviation.document import DesignFile, Deviations
-    from cylx.deviation.entries import DeviationEntry
-    from cylx.io import recorded_name
-    from cylx.results.parts import Input
-
-    entries = [
-        DeviationEntry.of(k, drawn.cylinders[k].name, one, check_deviation(one, limits)) for k, one in enumerate(found)
-    ]
-    about = DesignFile.model_validate({"file": recorded_name(design), "format": drawn.format, "scale": scale})
-    return Deviations.of(Input.of_cloud(cloud), about, limits, entries)
-
-
 def _write(
     content: Deviations,
-    cloud: PointCloud,
-    measured: tuple[list[Deviation], Any, Any],
+    found: Comparison,
     names: tuple[str | None, str | None, str | None],
     inputs: tuple[str, str],
     *,
@@ -188,7 +116,7 @@ def _write(
     if output is not None:
         files[output] = content.to_json().encode()
     if report is not None:
-        files[report] = page(content, cloud, *measured).encode()
+        files[report] = page(content, found).encode()
     if junit_file is not None:
         from cylx.evaluation.junit import junit_of
 
@@ -214,7 +142,7 @@ def _said(of: str, value: float | None, uncertainty: float | None, tolerance: fl
     return f"{of} {number(value, 6)} ± {number(uncertainty, 2)} is above {number(tolerance, 6)}"
 
 
-def page(content: Deviations, cloud: PointCloud, found: list[Deviation], labels: Any, residuals: Any) -> str:  # noqa: ANN401  arrays; numpy is imported late
+def page(content: Deviations, compared: Comparison) -> str:
     """Return the report: the cloud and the cylinders found in 3-D, unrolled maps, and the tables."""
     import numpy as np
 
@@ -224,6 +152,7 @@ def page(content: Deviations, cloud: PointCloud, found: list[Deviation], labels:
     from cylx.report.page_data import page_data_of
     from cylx.scene import measure_scene, resolve
 
+    cloud, found = compared.cloud, compared.deviations
     number_of = np.full(len(found) + 1, -1, np.int32)  # the last is that of no label
     present = [k for k, one in enumerate(found) if one.measured is not None]
     number_of[present] = np.arange(len(present))
@@ -231,8 +160,8 @@ def page(content: Deviations, cloud: PointCloud, found: list[Deviation], labels:
     scene = measure_scene(cloud.points, 0)
     missing = [f"cylinder {e.id}, {e.name}: not found, {e.fault}" for e in content.cylinders if e.fault is not None]
     extraction = Extraction(
-        cylinders=fits, labels=number_of[labels], residuals=residuals.astype(np.float32), cloud=cloud, scene=scene,
-        stages=(), config=resolve(load_config(), scene), warnings=tuple(missing),
+        cylinders=fits, labels=number_of[compared.labels], residuals=compared.residuals.astype(np.float32),
+        cloud=cloud, scene=scene, stages=(), config=resolve(load_config(), scene), warnings=tuple(missing),
     )  # fmt: skip
     data = page_data_of(extraction)
     data["tables"] = [

@@ -14,7 +14,7 @@ from cylx.cli.options.selection import selecting
 from cylx.cli.options.units import units_option
 from cylx.cli.terminal.failures import answer, tell
 from cylx.cli.terminal.group import ExampleCommand
-from cylx.errors import InputError, UsageError
+from cylx.errors import UsageError
 
 if TYPE_CHECKING:
     from cylx.records import PointCloud, Selection
@@ -83,11 +83,10 @@ def stems(
     quality; it goes to standard error, or as JSON to standard output with --json. Diameters are in metres, places in
     the unit of the scan.
     """
+    from cylx.api.stems import find_stems
     from cylx.io import check_annotated, check_writable, read_cloud
     from cylx.results.stems import Stems
     from cylx.scene import select
-    from cylx.stems import find_stems
-    from cylx.units import METRES
 
     named = [name for name in (*outputs, annotated, report) if name is not None]
     check_apart([scan], named)
@@ -98,10 +97,8 @@ def stems(
     cloud = select(read_cloud(scan, scan=selection.scan, units=units), selection)
     if annotated is not None:
         check_annotated(annotated, cloud)
-    unit = units or cloud.source.units or "m"
-    _check_size(cloud, METRES[unit])
-    plot = find_stems(cloud, unit=METRES[unit], ground=ground, min_dbh=min_dbh)
-    content = Stems.of(plot, unit)
+    plot = find_stems(cloud, units=units, ground=ground, min_dbh=min_dbh)
+    content = Stems.of(plot, units or cloud.source.units or "m")
     _write(plot, content, outputs, annotated, report, overwrite=overwrite)
     if as_json:
         answer(json.dumps(content.to_object(), indent=2, ensure_ascii=False) + "\n", as_json=True)
@@ -111,14 +108,6 @@ def stems(
 def _check_suffix(name: str) -> None:
     if not name.lower().endswith((".csv", ".json", *_MAPS)):
         raise UsageError(name, "is no format of stems", "choose a name that ends in .csv, .json, .gpkg or .geojson")
-
-
-def _check_size(cloud: PointCloud, unit: float) -> None:
-    """Refuse a cloud that is no plot in this unit: its ground would be a grid of too many cells."""
-    size = (cloud.points.max(axis=0) - cloud.points.min(axis=0)) * unit
-    if float(size[:2].max()) > 5000.0 or float(size[2]) > 1000.0:
-        fault = f"is {size[0]:.3g} m by {size[1]:.3g} m and {size[2]:.3g} m high, too large for a plot"
-        raise InputError(cloud.source.file, fault, "give its unit by --units, or a part of it by --crop")
 
 
 def _write(

@@ -25,7 +25,7 @@ from cylx.cli.terminal.group import ExampleGroup
 from cylx.errors import UsageError
 
 if TYPE_CHECKING:
-    from cylx.synthetic import SyntheticScene
+    from cylx.synthetic import Plot, SyntheticScene
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -162,6 +162,45 @@ def piping(
     write_scene(out, scene, precision=precision, overwrite=overwrite, as_json=as_json)
 
 
+@synth.command(
+    examples=["cylx synth forest plot.ply", "cylx synth forest plot.ply --side 30 --scanner mobile --slope 0.3"]
+)
+@click.argument("out", shell_complete=complete_files)
+@click.option("--side", type=float, default=20.0, show_default=True, help="Side of the square plot, metres.")
+@click.option("--stems-per-hectare", type=float, default=700.0, show_default=True, help="Density of the stems.")
+@click.option("--shrubs-per-hectare", type=float, default=400.0, show_default=True, help="Density of the shrubs.")
+@click.option(
+    "--scanner", type=click.Choice(["terrestrial", "mobile"]), default="terrestrial", show_default=True,
+    help="From a few places, or from a path with a noise of centimetres.",
+)  # fmt: skip
+@click.option("--stations", type=int, default=4, show_default=True, help="Number of places of a terrestrial scanner.")
+@click.option("--slope", type=float, default=0.2, show_default=True, help="Slope of the ground, height per length.")
+@click.option(
+    "--spacing", type=float, default=0.006, show_default=True, help="Spacing of points 10 m from a scanner, metres."
+)
+@output_options
+def forest(
+    *,
+    out: str,
+    scale: float,
+    offset: tuple[float, ...],
+    precision: str,
+    overwrite: bool,
+    as_json: bool,
+    **parameters: Any,  # noqa: ANN401  the options of the plot, of many types
+) -> None:
+    """Make a plot of a forest: stems with taper, lean and bark, branches, shrubs, and ground that slopes.
+
+    OUT ends in .ply, .pcd or .xyz. The unit is metres; --scale 1000 turns places into millimetres. The truth lists the
+    stems with their diameters at breast height, metres.
+    """
+    from cylx import synthetic
+
+    prepare(out, overwrite=overwrite)
+    plot = synthetic.forest(**parameters).moved(scale, offset)
+    write_scene(out, plot, precision=precision, overwrite=overwrite, as_json=as_json)
+
+
 def truth_path(out: str) -> str:
     """Return the name of the truth file of a cloud."""
     return str(Path(out).with_name(Path(out).stem + TRUTH))
@@ -176,14 +215,17 @@ def prepare(out: str, *, overwrite: bool) -> None:
         check_writable(path, overwrite=overwrite)
 
 
-def write_scene(out: str, scene: SyntheticScene, *, precision: str, overwrite: bool, as_json: bool) -> None:
+def write_scene(out: str, scene: SyntheticScene | Plot, *, precision: str, overwrite: bool, as_json: bool) -> None:
     """Write a scene and its truth, and print a JSON report if requested."""
     from cylx.io import write_cloud, write_text
+    from cylx.synthetic import SyntheticScene
 
     dtype: Literal["f4", "f8"] = "f4" if precision == "single" else "f8"
     write_cloud(out, scene.points, properties=None, overwrite=overwrite, dtype=dtype)
     write_text(truth_path(out), json.dumps(scene.truth(), indent=2) + "\n", overwrite=overwrite)
     if as_json:
         files = {"file": legible(out), "truth": legible(truth_path(out))}
-        told = {**files, "points": len(scene.points), "cylinders": len(scene.cylinders)}
+        true = {"cylinders": scene.cylinders} if isinstance(scene, SyntheticScene) else {"stems": scene.stems}
+        counts = {name: len(some) for name, some in true.items()}
+        told = {**files, "points": len(scene.points), **counts}
         answer(json.dumps(told, indent=2, ensure_ascii=False) + "\n", as_json=True)

@@ -5,15 +5,18 @@ points ─ assign ─> those of each design cylinder ─ fit ─> its cylinder �
 
 from __future__ import annotations
 
+from cylx.deviation.comparison import Comparison, compare_with_design
 from cylx.deviation.measure import Deviation, Measured, measure_deviations, shapes_of
 from cylx.deviation.verdict import Check, Tolerances, check_deviation, overall
 
 __all__ = [
     "Check",
+    "Comparison",
     "Deviation",
     "Measured",
     "Tolerances",
     "check_deviation",
+    "compare_with_design",
     "measure_deviations",
     "overall",
     "shapes_of",

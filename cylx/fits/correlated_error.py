@@ -7,16 +7,18 @@ restricted likelihood (Patterson and Thompson, Biometrika 58, 1971), in which th
 slope, which take up most of a long wave, are allowed for; all are averaged over, because a single surface tells little
 of l. The fit
 weighs all points alike, and so its covariance is A^-1 X^T V X A^-1, with the rows X of the parameters, A = X^T X, and V
-the covariance of the points.
+the covariance of the points. An estimate that weighs them otherwise has its own variance, h^T V h, with what each point
+counts in it, h.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
-from cylx.geometry.arrays import FloatArray
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.kernels import njit
 
 COLUMNS, ROWS = 20, 5
@@ -30,6 +32,27 @@ LENGTHS = np.geomspace(0.25, 32.0, 8)
 VARIANCES = np.geomspace(1.0 / 16.0, 128.0, 9)
 """Variances that are tried, in mean squares of the cells' residuals, for a length of up to one side; little of a long
 wave is left in the residuals, so that its variance is larger by its length."""
+
+
+class Shared(NamedTuple):
+    """The errors that neighbouring points share.
+
+    Parameters
+    ----------
+    cell : ndarray of shape (n,)
+        The cell of each point.
+    weighted : ndarray of shape (k, 5)
+        Rows of the parameters of the cylinder, times the number of points of the cell.
+    inverse : ndarray of shape (5, 5)
+        Inverse of the sum of the products of the points' rows.
+    covariance : ndarray of shape (k, k)
+        Of the shared errors of the cells.
+    """
+
+    cell: IndexArray
+    weighted: FloatArray
+    inverse: FloatArray
+    covariance: FloatArray
 
 
 def shared_covariance(
@@ -58,6 +81,40 @@ def shared_covariance(
     >>> bool(waves[4, 4] > 30 * white[4, 4])
     True
     """
+    shared = _shared_errors(heights, residuals, angles, radius)
+    if shared is None:
+        return None
+    spread = np.einsum("ia,ib->ab", shared.weighted, np.einsum("ij,jb->ib", shared.covariance, shared.weighted))
+    covariance = shared.inverse @ spread @ shared.inverse
+    return np.asarray(0.5 * (covariance + covariance.T), dtype=np.float64)
+
+
+def shared_variance(
+    heights: FloatArray, residuals: FloatArray, angles: FloatArray, radius: float, influence: FloatArray
+) -> float | None:
+    """Return how much the errors that points share add to the variance of an estimate that is linear in them.
+
+    Parameters
+    ----------
+    heights, residuals, angles, radius
+        As for `shared_covariance`.
+    influence : ndarray of shape (n,)
+        Change of the estimate by an error of each point.
+
+    Returns
+    -------
+    float or None
+        None if the points fill too few cells.
+    """
+    shared = _shared_errors(heights, residuals, angles, radius)
+    if shared is None:
+        return None
+    on = np.bincount(shared.cell, influence, minlength=len(shared.covariance))
+    return float(np.einsum("i,i->", on, np.einsum("ij,j->i", shared.covariance, on)))
+
+
+def _shared_errors(heights: FloatArray, residuals: FloatArray, angles: FloatArray, radius: float) -> Shared | None:
+    """Return the errors that neighbouring points share, None if the points fill too few cells."""
     low, high = float(heights.min(initial=0.0)), float(heights.max(initial=0.0))
     place = ((angles / (2.0 * np.pi) + 0.5) * COLUMNS).astype(np.int64) % COLUMNS * ROWS
     place += np.clip(((heights - low) / max(high - low, 1e-300) * ROWS).astype(np.int64), 0, ROWS - 1)
@@ -82,7 +139,7 @@ def shared_covariance(
     distances = np.hypot(across, means[:, 6, None] - means[:, 6])
     side = math.sqrt((high - low) / ROWS * 2.0 * math.pi * radius / COLUMNS)
     if not float((values**2 / np.maximum(white, 1e-300)).mean()) > UNSHARED:
-        return np.zeros((5, 5))
+        return Shared(cell, weighted[:, :5], np.zeros((5, 5)), np.zeros((cells, cells)))
     unit = float((values**2).mean())
     tried: list[tuple[float, float, FloatArray]] = []
     for length in LENGTHS:
@@ -99,10 +156,8 @@ def shared_covariance(
         chosen += weight * variance * shape
         total += weight
     chosen /= total
-    spread = np.einsum("ia,ib->ab", weighted[:, :5], np.einsum("ij,jb->ib", chosen, weighted[:, :5]))
     inverse = np.linalg.pinv(gram[:5, :5], hermitian=True)
-    covariance = inverse @ spread @ inverse
-    return np.asarray(0.5 * (covariance + covariance.T), dtype=np.float64)
+    return Shared(cell, weighted[:, :5], inverse, chosen)
 
 
 @njit(cache=True, nogil=True)

@@ -21,7 +21,7 @@ SHARP = 0.34
 uniform background 0.378."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=NUMBERS)
+@njit(cache=True, nogil=True, fastmath=NUMBERS)
 def candidate_quality(
     xyz: FloatArray, n: int, model: FloatArray, width: float, basis: FloatArray, quality: FloatArray
 ) -> None:

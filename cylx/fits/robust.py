@@ -54,7 +54,7 @@ class WeightSchedule(NamedTuple):
     tolerance: float = 1e-9
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _fill_block(
     xyz: FloatArray,
     start: int,
@@ -91,7 +91,7 @@ def _fill_block(
         block[3, k], block[4, k] = residual, z
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _accumulate(
     xyz: FloatArray,
     n: int,

@@ -10,7 +10,7 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.kernels import njit
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def arc_place(px: float, py: float, pz: float, frame: FloatArray, radius: float, angle: float) -> tuple[float, float]:
     """Return how far along the centre line a point is, and how far from it; see `fill_arc_coordinates`."""
     half = 0.5 * angle
@@ -38,7 +38,7 @@ def arc_place(px: float, py: float, pz: float, frame: FloatArray, radius: float,
     return radius * (turn + half), math.sqrt(out * out + z * z)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def fill_arc_coordinates(
     points: FloatArray, frame: FloatArray, radius: float, angle: float, along: FloatArray, distances: FloatArray
 ) -> None:

@@ -62,7 +62,7 @@ def search_circle(
     return record
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _support(xy: FloatArray, n: int, x: float, y: float, radius: float, tolerance: float) -> float:
     score = 0.0
     for i in range(n):

@@ -256,7 +256,7 @@ def search_conic(
     return record
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _support(xy: FloatArray, n: int, conic: FloatArray, tolerance: float) -> float:
     """Return the sum of one minus the squared distance from a conic over the squared tolerance, to first order."""
     a, b, c, d, e = conic[0], conic[1], conic[2], conic[3], conic[4]

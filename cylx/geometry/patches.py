@@ -72,7 +72,7 @@ def fit_patches(
                 square += (points[found[a], d] - center[d]) ** 2
             squares[a] = ordered[a] = square
         sort_in_place(ordered, n)
-        limit, k = ordered[min(n, SIZE) - 1], 0
+        limit, k = ordered[min(n, SIZE) - 1], np.int64(0)  # a bare 0 is a kind of its own
         for a in range(n):
             if squares[a] <= limit and k < SIZE:
                 members[s, k] = found[a]

@@ -68,7 +68,7 @@ def fit_plane(
     return float(inside / n)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _fill_plane_sums(
     xyz: FloatArray, n: int, width: float, center: FloatArray, normal: FloatArray, sums: FloatArray
 ) -> None:
@@ -87,7 +87,7 @@ def _fill_plane_sums(
     sums[4], sums[5], sums[6], sums[7], sums[8], sums[9] = xx, xy, xz, yy, yz, zz
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _count_beside(xyz: FloatArray, n: int, width: float, center: FloatArray, normal: FloatArray) -> tuple[float, float]:
     """Return the number of points within `width` of a plane, and the sum of their squared distances."""
     cx, cy, cz, nx, ny, nz = center[0], center[1], center[2], normal[0], normal[1], normal[2]
@@ -144,7 +144,7 @@ def osculating_cylinder(
     return fill_osculating(terms, center, normal, basis, model)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _fill_moments(local: FloatArray, n: int, width: float, gram: FloatArray, terms: FloatArray) -> float:
     """Fill the normal equations of a quadric over the plane from points whose last residual is within `width`."""
     x1, y1, x2, xy, y2 = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -174,7 +174,7 @@ def _fill_moments(local: FloatArray, n: int, width: float, gram: FloatArray, ter
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def _fill_residuals(local: FloatArray, n: int, width: float, terms: FloatArray) -> float:
     """Fill in the residuals; return the sum of their sizes over the points whose last one was within `width`."""
     a, b, c, d, e, f = terms[0], terms[1], terms[2], terms[3], terms[4], terms[5]

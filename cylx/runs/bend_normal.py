@@ -14,7 +14,7 @@ PARAMETERS = 10
 """Two offsets and two tilts of the first axis, the same of the second, radius of the tube, bend radius."""
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def fill_bend_frame(
     axes: FloatArray, signs: FloatArray, state: FloatArray, frame: FloatArray, skew: FloatArray
 ) -> tuple[float, float]:
@@ -77,7 +77,7 @@ def fill_bend_frame(
     return radius, angle
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def fill_bend_normal(
     points: FloatArray,
     axes: FloatArray,

@@ -11,13 +11,13 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.kernels import njit
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def gain_of(error: float, spread: float, ratio: float) -> float:
     """Return how much a point speaks for a surface: its log-likelihood ratio, no less than against it at most."""
     return max(ratio - 0.5 * (error / spread) ** 2, -ratio)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def fill_radius_costs(
     points: FloatArray,
     corner: FloatArray,
@@ -63,7 +63,7 @@ def fill_radius_costs(
                 costs[k] += squares[k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def fill_bend_scores(
     local: FloatArray,
     turns: FloatArray,
@@ -118,7 +118,7 @@ def fill_bend_scores(
                     scores[t, r, 0], scores[t, r, 1], scores[t, r, 2] = best, befores[b], (place + 1) * step / size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def fill_reducer_scores(
     local: FloatArray, tried: FloatArray, surface: FloatArray, back: float, step: float, scores: FloatArray
 ) -> None:
@@ -160,7 +160,7 @@ def fill_reducer_scores(
         scores[m, 0], scores[m, 1] = best, back + (place + 1) * step
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True)
 def fill_cone_costs(
     local: FloatArray, tried: FloatArray, radii: FloatArray, second: FloatArray, width: float, costs: FloatArray
 ) -> None:

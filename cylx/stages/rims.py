@@ -126,7 +126,7 @@ def _find_circles(
             reach = REACHES[level]
             if totals[level] < LEAST_ON or (level > 0 and totals[level] == totals[level - 1]):
                 continue
-            stride, n, seen = 1 + totals[level] // MOST_SEEN, 0, 0
+            stride, n, seen = 1 + totals[level] // MOST_SEEN, np.int64(0), 0  # a bare 0 is a kind of its own
             for j in range(low, high):
                 dx, dy = flat[j, 0] - flat[i, 0], flat[j, 1] - flat[i, 1]
                 if dx * dx + dy * dy < reach * reach:

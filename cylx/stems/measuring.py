@@ -14,6 +14,8 @@ from cylx.stems.following import Section, Stretch, is_stem
 BREAST_HEIGHT = 1.3
 BREAST_HALF = 0.4
 """Half the height of the section at breast height, metres."""
+GROUND_SD = 0.05
+"""Standard deviation of the height of the ground, and so of the height at which a diameter is measured, metres."""
 ROUND = 0.85
 """A section whose least diameter is a smaller share of the greatest is not round."""
 LEAST_LENGTH = 1.0
@@ -106,6 +108,8 @@ def _described(stretch: Stretch, sections: list[Section], foot: float, filled: f
         rise = known.height - BREAST_HEIGHT
         dbh += (0.0 if math.isnan(taper) else taper) * rise
         sd = math.hypot(sd, 0.01 * rise)
+    if not math.isnan(taper):
+        sd = math.hypot(sd, taper * GROUND_SD)
     if not 0.0 < dbh < MOST or sd > WORST_SD * dbh:
         return None
     quality = _quality(known, sections, filled, sd / dbh)

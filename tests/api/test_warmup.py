@@ -64,6 +64,29 @@ def test_without_another_process_it_goes_on(monkeypatch):
         pass
 
 
+def test_no_kernel_is_compiled_for_a_number_that_a_loop_then_changes():
+    """Numba takes a bare 0 for a kind of its own; a count that starts with it would compile its kernels twice."""
+    code = """
+from numba.core.types import unliteral
+from cylx.api.warmup import warm_up
+from cylx.geometry.kernels import _kernels
+from cylx.records import SilentObserver
+
+warm_up(SilentObserver())
+twice = []
+for one in _kernels:
+    kinds = [tuple(unliteral(kind) for kind in signature) for signature in one.overloads]
+    if len(set(kinds)) < len(kinds):
+        twice.append(one.py_func.__name__)
+assert len(_kernels) > 100
+assert not twice, twice
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, check=False, cwd=ROOT, timeout=PATIENCE, text=True
+    )
+    assert done.returncode == 0, done.stderr
+
+
 def test_a_scan_calls_no_practised_kernel_with_arguments_of_another_kind():
     """An array of another layout would be another kernel, compiled when the first scan comes."""
     code = """

@@ -13,7 +13,7 @@ import numpy as np
 
 from cylx.records import PointCloud
 from cylx.stems import find_stems
-from cylx.synthetic.forest import forest
+from cylx.synthetic.stand import forest
 
 LEAST_DBH, LEAST_ARC = 0.10, math.radians(90.0)
 SAME_PLACE = 0.15
@@ -93,7 +93,7 @@ def main():
         f"{args.scanner}: found {counts[0]} of {counts[0] + counts[1]}, false {counts[2]}, "
         f"bias {100 * e.mean():.2f} %, rmse {100 * math.sqrt((e**2).mean()):.2f} %, "
         f"largest {100 * np.abs(e).max():.1f} %, "
-        f"within two standard deviations {100 * (np.abs(z) < 2).mean():.0f} %"
+        f"within one standard deviation {100 * (np.abs(z) < 1).mean():.0f} %, two {100 * (np.abs(z) < 2).mean():.0f} %"
     )
 
 

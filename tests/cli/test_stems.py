@@ -13,7 +13,7 @@ import pytest
 
 from cylx.io import write_cloud
 from cylx.results.stems import COLUMNS, stems_schema
-from cylx.synthetic.forest import forest
+from cylx.synthetic.stand import forest
 
 ORIGIN = (432000.0, 5410000.0, 310.0)
 
@@ -22,7 +22,7 @@ ORIGIN = (432000.0, 5410000.0, 310.0)
 def scan(tmp_path_factory):
     """Write a small plot with map coordinates."""
     folder = tmp_path_factory.mktemp("plot")
-    plot = forest(5, side=6.0, origin=ORIGIN, spacing=0.02, shrubs_per_hectare=100)
+    plot = forest(5, side=6.0, spacing=0.02, shrubs_per_hectare=100).moved(offset=ORIGIN)
     write_cloud(folder / "plot.ply", plot.points)
     las = laspy.LasData(laspy.LasHeader(point_format=6, version="1.4"))
     las.header.scales, las.header.offsets = [0.0005] * 3, ORIGIN

@@ -93,6 +93,9 @@ def test_what_exists_stays(run_cylx, tmp_path, existing):
         ("single", ["--seed", "-1"], "Invalid value for '--seed'"),
         ("multi", ["--radius", "0.1:"], "--radius: one side is empty; give both, such as 0.04:0.16"),
         ("multi", ["--room", "0.1"], ""),
+        ("forest", ["--side", "1"], "side: must be 2 to 200 m, not 1.0"),
+        ("forest", ["--spacing", "0"], "spacing: must be 0.001 to 0.1 m, not 0.0"),
+        ("forest", ["--scanner", "none"], "Invalid value for '--scanner'"),
     ],
 )
 def test_an_impossible_scene_is_refused(run_cylx, tmp_path, kind, options, fault):
@@ -119,7 +122,33 @@ def test_piping_lists_fittings_and_runs(run_cylx, tmp_path):
     assert json.loads((tmp_path / "plant.truth.json").read_bytes()) == scene.truth()
 
 
-@pytest.mark.parametrize("kind", ["single", "multi", "piping"])
+def test_a_forest_lists_its_stems(run_cylx, tmp_path):
+    options = ["--side", 5, "--stems-per-hectare", 1200, "--shrubs-per-hectare", 200, "--scanner", "mobile"]
+    options += ["--stations", 2, "--slope", 0.3, "--spacing", 0.02, "--seed", 5]
+    moved = ["--scale", 1000, "--offset", "5000,6000,7000"]
+    done = run_cylx("synth", "forest", tmp_path / "plot.ply", *options, *moved, "--json")
+    assert done.exit_code == 0, done.stderr
+    plot = synthetic.forest(
+        5, side=5, stems_per_hectare=1200, shrubs_per_hectare=200, scanner="mobile", stations=2, slope=0.3, spacing=0.02
+    )
+    there = plot.moved(1000, (5000, 6000, 7000))
+    assert np.array_equal(read_cloud(tmp_path / "plot.ply").points, there.points)
+    truth = json.loads((tmp_path / "plot.truth.json").read_bytes())
+    assert truth == there.truth()
+    assert json.loads(done.stdout)["stems"] == len(truth["stems"]) == 3
+    for entry, stem in zip(truth["stems"], plot.stems, strict=True):  # places are moved, diameters are metres
+        assert entry["x"] == pytest.approx(1000 * stem.x + 5000)
+        assert entry["ground"] == pytest.approx(1000 * stem.ground + 7000)
+        assert entry["dbh"] == stem.dbh
+    assert (
+        synthetic.forest(
+            seed=truth["seed"], **{k: v for k, v in truth["params"].items() if k not in {"scale", "offset"}}
+        ).points.tolist()
+        == plot.points.tolist()
+    )
+
+
+@pytest.mark.parametrize("kind", ["single", "multi", "piping", "forest"])
 def test_the_defaults_are_those_of_the_library(kind):
     options = {option.name: option.default for option in synth.commands[kind].params}
     library = {

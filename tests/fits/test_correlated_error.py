@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cylx.fits.correlated_error import shared_covariance
+from cylx.fits.correlated_error import shared_covariance, shared_variance
 
 NOISE = 0.01
 
@@ -84,6 +84,20 @@ def test_the_middle_of_a_cone_is_as_certain_as_a_cylinder():
     shared = shared_covariance(heights, residuals, angles, 1.0)
     independent = white * NOISE**2 / residuals.var()
     assert (np.diag(shared) < 2.0 * np.diag(independent)).all()
+
+
+def test_the_variance_of_an_estimate_that_weighs_all_alike_is_in_the_covariance():
+    rng = np.random.default_rng(7)
+    angles, heights, errors = drawn(rng, 2.0, 1.0, 0.3, 1.0)
+    _, residuals, _ = fitted(angles, heights, errors)
+    cosine, sine = np.cos(angles), np.sin(angles)
+    rows = np.column_stack([cosine, sine, heights * cosine, heights * sine, np.ones(len(angles))])
+    influence = np.linalg.solve(rows.T @ rows, rows.T)[4]
+    covariance = shared_covariance(heights, residuals, angles, 1.0)
+    variance = shared_variance(heights, residuals, angles, 1.0, influence)
+    assert variance == pytest.approx(covariance[4, 4], rel=0.2)  # its rows are means over cells
+    assert variance > 0
+    assert shared_variance(heights, residuals, angles, 1.0, 2.0 * influence) == pytest.approx(4.0 * variance)
 
 
 @pytest.mark.parametrize("n", [0, 1, 5, 20])

@@ -3,8 +3,8 @@
 MAY_IMPORT = {
     "__main__": {"cli"},
     "cylx": {
-        "api", "config", "errors", "evaluation", "geometry", "io", "moved", "pipeline", "records", "report", "results",
-        "version",
+        "api", "config", "deviation", "errors", "evaluation", "geometry", "io", "moved", "pipeline", "records",
+        "report", "results", "version",
     },
     "cli": {
         "api", "config", "deviation", "errors", "evaluation", "experiments", "export", "harmless", "io", "optional",
@@ -12,11 +12,11 @@ MAY_IMPORT = {
         "version", "wkt", "wording",
     },
     "api": {
-        "config", "evaluation", "fits", "geometry", "io", "pipeline", "records", "results", "runs", "scene", "stages",
-        "tiles",
+        "config", "deviation", "errors", "evaluation", "fits", "geometry", "io", "pipeline", "records", "results",
+        "runs", "scene", "stages", "stems", "tiles", "units",
     },
     "runs": {"fits", "geometry", "records"},
-    "deviation": {"errors", "geometry", "pipeline", "records", "results", "version"},
+    "deviation": {"errors", "geometry", "pipeline", "records", "results", "version", "wording"},
     "stems": {"fits", "geometry", "optional", "records"},
     "tiles": {"config", "errors", "geometry", "io", "optional", "pipeline", "records", "scene"},
     "experiments": {"config", "fits", "geometry", "optional", "pipeline", "records", "synthetic", "version"},

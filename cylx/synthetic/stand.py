@@ -1,4 +1,4 @@
-"""A plot of a forest as scanners see it: stems with taper, lean and bark, branches, shrubs and ground, and the truth.
+"""A plot of a forest as scanners see it: stems with taper, lean and bark, branches, shrubs and ground.
 
 Stems are not round, and thicken towards the ground. A terrestrial scanner stands at a few places, and sees the sides of
 the stems that face it and that no other stem hides. A mobile one walks round and through the plot: it sees nearly all
@@ -8,12 +8,13 @@ sides, with a noise of centimetres.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
+from cylx.geometry.arrays import FloatArray, MaskArray
+from cylx.synthetic.plot import Plot, TrueStem
+from cylx.synthetic.scene import demand
 
 BREAST_HEIGHT = 1.3
 HARMONICS = 12
@@ -22,53 +23,8 @@ CLUTTER = -1
 GROUND = -2
 
 
-@dataclass(frozen=True, slots=True)
-class TrueStem:
-    """A stem of a made plot.
-
-    Parameters
-    ----------
-    x, y, ground : float
-        Its foot, and the height of the ground there, metres.
-    dbh : float
-        Mean diameter across the axis at 1.3 m above the ground, metres.
-    lean : float
-        Angle of its axis at 1.3 m from the vertical, radians.
-    height : float
-        Up to which it has points, metres above the ground.
-    arc : float
-        Angle about the axis of which it has points between 1 and 1.6 m, radians.
-    """
-
-    x: float
-    y: float
-    ground: float
-    dbh: float
-    lean: float
-    height: float
-    arc: float = 0.0
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Plot:
-    """A made plot.
-
-    Parameters
-    ----------
-    points : ndarray of shape (N, 3)
-        Metres.
-    labels : ndarray of shape (N,)
-        Index of the stem; -1 for branches, leaves and shrubs, -2 for ground.
-    stems : tuple of TrueStem
-    """
-
-    points: FloatArray
-    labels: IndexArray
-    stems: tuple[TrueStem, ...]
-
-
 def forest(
-    seed: int,
+    seed: int = 0,
     *,
     side: float = 20.0,
     stems_per_hectare: float = 700.0,
@@ -77,7 +33,6 @@ def forest(
     slope: float = 0.2,
     shrubs_per_hectare: float = 400.0,
     spacing: float = 0.006,
-    origin: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Plot:
     """Make a square plot of a forest.
 
@@ -95,13 +50,28 @@ def forest(
         Of the ground, height per length.
     spacing : float
         Distance of points at 10 m from the scanner; a mobile one has four times as much.
-    origin : (float, float, float)
-        Added to all coordinates.
 
     Returns
     -------
     Plot
+        In metres, with a corner at the origin.
+
+    Raises
+    ------
+    UsageError
+        If a parameter is impossible.
+
+    Examples
+    --------
+    >>> plot = forest(3, side=8.0, spacing=0.02)
+    >>> len(plot.stems)
+    4
     """
+    params = {
+        "side": side, "stems_per_hectare": stems_per_hectare, "scanner": scanner, "stations": stations, "slope": slope,
+        "shrubs_per_hectare": shrubs_per_hectare, "spacing": spacing,
+    }  # fmt: skip
+    _check(side, stems_per_hectare, shrubs_per_hectare, scanner, stations, slope, spacing)
     rng = np.random.default_rng(seed)
     ground = _Terrain(rng, slope)
     feet = _scattered(rng, side, stems_per_hectare * side * side / 1e4, 1.0)
@@ -129,12 +99,20 @@ def forest(
     points = np.concatenate([part for part, _ in parts])
     labels = np.repeat([label for _, label in parts], [len(part) for part, _ in parts])
     noise = rng.uniform(0.02, 0.03) if mobile else 0.003
-    points = points + rng.normal(0.0, noise, points.shape) + np.array(origin)
-    moved = tuple(
-        TrueStem(s.x + origin[0], s.y + origin[1], s.ground + origin[2], s.dbh, s.lean, s.height, s.arc) for s in stems
-    )
-    inside = (np.abs(points[:, :2] - np.array(origin[:2]) - 0.5 * side) < 0.5 * side + 1.0).all(axis=1)
-    return Plot(points[inside], labels[inside], moved)
+    points = points + rng.normal(0.0, noise, points.shape)
+    inside = (np.abs(points[:, :2] - 0.5 * side) < 0.5 * side + 1.0).all(axis=1)
+    return Plot(points[inside], labels[inside], tuple(stems), seed, params)
+
+
+def _check(side: float, stems: float, shrubs: float, scanner: str, stations: int, slope: float, spacing: float) -> None:
+    """Refuse what is no plot, or one of too many points."""
+    demand(2.0 <= side <= 200.0, "side", f"must be 2 to 200 m, not {side}")
+    demand(0.0 <= stems <= 5000.0, "stems_per_hectare", f"must be 0 to 5000, not {stems}")
+    demand(0.0 <= shrubs <= 10000.0, "shrubs_per_hectare", f"must be 0 to 10000, not {shrubs}")
+    demand(scanner in {"terrestrial", "mobile"}, "scanner", f"must be terrestrial or mobile, not {scanner}")
+    demand(1 <= stations <= 100, "stations", f"must be 1 to 100, not {stations}")
+    demand(0.0 <= slope <= 1.5, "slope", f"must be 0 to 1.5, not {slope}")
+    demand(0.001 <= spacing <= 0.1, "spacing", f"must be 0.001 to 0.1 m, not {spacing}")
 
 
 class _Terrain:
