@@ -111,7 +111,8 @@ def judged(
     rms = float(np.sqrt((errors[own] ** 2).mean()))
     if not one_bend or lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
         return None
-    if bend.angle > FURTHEST_TURN and _deviates(bend, radius, near.points[indices[own]], rows[own], errors[own]):
+    about = own | beside
+    if bend.angle > FURTHEST_TURN and _deviates(bend, radius, near.points[indices[about]], rows[about], errors[about]):
         return None
     coverage = _covered(bend, near.points[indices[own]], rows[own]) / (12.0 * pieces)
     of_bend = own & (along > -corner) & (along < bend.length + corner)
