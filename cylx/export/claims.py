@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, radians, sin, tan
+from math import atan2, cos, degrees, radians, sin, tan
 from typing import Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from cylx.export.solids import Bend, unit
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import canonical_direction
+from cylx.geometry.lines import common_perpendicular
 from cylx.geometry.numerics import cross
 from cylx.results import ResultCylinder
 from cylx.results.fittings import (
@@ -30,6 +31,8 @@ STEEPEST = radians(150.0)
 """Bends by more than this have no corner that is of use."""
 FLATTEST = radians(10.0)
 """Branches at less than this angle are drawn as at this one."""
+STRAIGHT = radians(3.0)
+"""A gap between axes at a smaller angle is bridged straight."""
 FLAT = 0.1
 """Thickness of a cap that does not bulge, in its radius."""
 
@@ -80,8 +83,9 @@ def claims_of(fitting: AnyFitting, cylinders: Mapping[int, ResultCylinder]) -> l
         return [Claim(fitting.id, fitting.joins[0], "side", 0.5 * (start + end), reach, gives_way=True)]
     if len(fitting.joins) != 2 or "side" in fitting.ends:
         return []
-    if isinstance(fitting, ResultElbow):
-        places, reach = _elbow(fitting)
+    bent = elbow_of(fitting, cylinders)
+    if bent is not None:
+        places, reach = _elbow(bent)
     else:
         places, reach = (np.array(fitting.start), np.array(fitting.end)), 0.0
         if isinstance(fitting, ResultJoint | ResultInline) and _overlap(fitting, places, cylinders):
@@ -90,6 +94,50 @@ def claims_of(fitting: AnyFitting, cylinders: Mapping[int, ResultCylinder]) -> l
         Claim(fitting.id, number, end, place, reach)
         for number, end, place in zip(fitting.joins, fitting.ends, places, strict=True)
     ]
+
+
+def elbow_of(fitting: AnyFitting, cylinders: Mapping[int, ResultCylinder]) -> ResultElbow | None:
+    """Return a fitting as the elbow it is drawn as: an elbow, or a gap around a corner; None for anything else.
+
+    The arc over a gap touches both axes. It begins at the end that is nearer to where these meet, and the other
+    cylinder is drawn up to it.
+
+    Parameters
+    ----------
+    fitting : fitting
+    cylinders : mapping of int to ResultCylinder
+        Those that it joins.
+    """
+    if isinstance(fitting, ResultElbow):
+        return fitting
+    if not isinstance(fitting, ResultJoint) or len(fitting.joins) != 2 or "side" in fitting.ends:
+        return None
+    one, two = (cylinders[number] for number in fitting.joins)
+    first, second = _outward(one, fitting.ends[0]), -_outward(two, fitting.ends[1])
+    across = cross(first, second)
+    turn = atan2(float(np.linalg.norm(across)), float(first @ second))
+    if not STRAIGHT < turn < STEEPEST:
+        return None
+    start, end = np.array(fitting.start), np.array(fitting.end)
+    feet = common_perpendicular(start, first, end, second)[:2]
+    ahead = min(float((feet[0] - start) @ first), float((end - feet[1]) @ second))
+    radius = 0.5 * (one.radius + two.radius)
+    if ahead < -radius:  # they passed each other
+        return None
+    corner, tangent = 0.5 * (feet[0] + feet[1]), max(ahead, 0.0)
+    bend_radius, normal = tangent / tan(0.5 * turn), unit(across, np.zeros(3))
+    begin = corner - tangent * first
+    return ResultElbow(
+        **fitting.model_dump(exclude={"kind", "start", "end", "length", "assumed"}),
+        kind="elbow",
+        center=(begin + bend_radius * cross(normal, first)).tolist(),
+        normal=normal.tolist(),
+        bend_radius=bend_radius,
+        angle_deg=degrees(turn),
+        radius=radius,
+        start=begin.tolist(),
+        end=(corner + tangent * second).tolist(),
+    )
 
 
 def bend_of(elbow: ResultElbow) -> Bend | None:

@@ -104,7 +104,8 @@ def _product(model: Model, part: Part, axes: object) -> Any:  # noqa: ANN401  ha
         product = model.root("IfcPipeSegment", part.name, PredefinedType="RIGIDSEGMENT", **attributes)
     else:
         kind = part.fitting.kind
-        product = model.root("IfcPipeFitting", part.name, ObjectType=kind, PredefinedType=KINDS[kind], **attributes)
+        form = KINDS["elbow"] if kind == "joint" and len(part.lines[0]) > len(part.ports) else KINDS[kind]
+        product = model.root("IfcPipeFitting", part.name, ObjectType=kind, PredefinedType=form, **attributes)
     values = {} if part.cylinder is None else values_of(part.cylinder)
     if part.fitting is not None:
         values = _values_of_fitting(part.fitting)

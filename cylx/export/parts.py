@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cylx.export.claims import bend_of
+from cylx.export.claims import bend_of, elbow_of
 from cylx.export.layout import TINY, Key, Layout, Port, lay_out
 from cylx.export.solids import Cone, Mitre, Solid, unit
 from cylx.geometry.arrays import FloatArray
@@ -109,6 +109,7 @@ def piping_of(
     """
     layout = lay_out(cylinders, fittings)
     by_id = {one.id: (one, color) for one, color in zip(cylinders, colors, strict=True)}
+    found_by_id = {one.id: one for one in cylinders}
     parts: list[Part] = []
     links: list[tuple[tuple[int, int], tuple[int, int]]] = []
     where: dict[Key, tuple[int, int]] = {}
@@ -122,7 +123,7 @@ def piping_of(
             own = sorted(keys[number], key=lambda key, joins=fitting.joins: (joins.index(key[1]), key[2] == "high"))  # type: ignore[misc]  # a default binds the loop's value
             where |= {key: (len(parts), k) for k, key in enumerate(own)}
             of_fitting[number] = len(parts)
-            parts.append(_fitting(fitting, own, layout))
+            parts.append(_fitting(fitting, own, layout, elbow_of(fitting, found_by_id)))
     counts: dict[int, int] = {}
     for straight in layout.straights:
         counts[straight.cylinder] = counts.get(straight.cylinder, 0) + 1
@@ -146,18 +147,18 @@ def piping_of(
     return Piping(tuple(parts), tuple(links), systems, names, _bores(cylinders, runs))
 
 
-def _fitting(fitting: AnyFitting, keys: Sequence[Key], layout: Layout) -> Part:
-    """Make the part of a fitting from its ports."""
+def _fitting(fitting: AnyFitting, keys: Sequence[Key], layout: Layout, elbow: ResultElbow | None) -> Part:
+    """Make the part of a fitting, or of the elbow it is drawn as, from its ports."""
     ports = tuple(layout.ports[key] for key in keys)
     lines: tuple[Path, ...] = ((ports[0].place, ports[-1].place),)
     solids: Iterable[Solid | None]
-    if isinstance(fitting, ResultElbow):
-        bend = bend_of(fitting)
+    if elbow is not None:
+        bend = bend_of(elbow)
         if bend is not None:
             solids = (bend,)
             lines = ((bend.start, bend.at(0.5 * bend.angle), bend.at(bend.angle)),)
         else:
-            solids, lines = _mitre(fitting, ports)
+            solids, lines = _mitre(elbow, ports)
     elif isinstance(fitting, ResultTee | ResultCross):
         solids, lines = _junction(fitting, keys, layout)
     elif isinstance(fitting, ResultReducer):

@@ -15,7 +15,7 @@ from cylx.export.parts import Part, Piping
 from cylx.export.solids import Bend
 from cylx.geometry.arrays import FloatArray
 from cylx.harmless import visible
-from cylx.results.fittings import ResultElbow, ResultFlange, ResultReducer, ResultTee
+from cylx.results.fittings import ResultElbow, ResultFlange, ResultJoint, ResultReducer, ResultTee
 from cylx.units import METRES
 
 MILLIMETRES = 1000.0
@@ -103,7 +103,7 @@ class _Writer:
             named = [] if match is None or match.decision != "snapped" or not match.name else [match.name]
             return self.block("PIPE", part, ends, said=[part.name, *named])
         fitting = part.fitting
-        if isinstance(fitting, ResultElbow):
+        if isinstance(fitting, ResultElbow) or (isinstance(fitting, ResultJoint) and len(part.lines[0]) > len(ends)):
             return self.elbow(part, ends)
         if len(part.ports) > 2:
             kind, key = ("TEE", "TEBW") if isinstance(fitting, ResultTee) else ("CROSS", "CRBW")
@@ -114,8 +114,8 @@ class _Writer:
             return self.reducer(fitting, part, ends)
         if len(part.ports) == 1:
             return self.block("CAP", part, ends, "SKEY KABW")
-        if fitting is not None and fitting.kind == "joint":
-            return self.block("PIPE", part, ends, said=[part.name, "assumed"])
+        if isinstance(fitting, ResultJoint):
+            return self.block("PIPE", part, ends)
         return self.block("VALVE", part, ends, "SKEY VVBW")
 
     def along(self, number: int, part: Part, bores: Sequence[float]) -> _Ends:
@@ -140,7 +140,7 @@ class _Writer:
         if np.linalg.norm(ends.places[1] - ends.places[0]) * self.scale < 1e-3:
             return []
         points = [self.place("END-POINT", place, size) for place, size in zip(*ends, strict=True)]
-        notes = [f"COMPONENT-ATTRIBUTE{k} {visible(text)}" for k, text in enumerate(said or [part.name], start=1)]
+        notes = [f"COMPONENT-ATTRIBUTE{k} {visible(text)}" for k, text in enumerate(said or _said(part), start=1)]
         return [kind, *(f"    {line}" for line in (*points, *others, *notes))]
 
     def place(self, keyword: str, place: FloatArray, size: float | None = None) -> str:
@@ -202,6 +202,11 @@ class _Writer:
         if reducer.concentric:
             return self.block("REDUCER-CONCENTRIC", part, ends, "SKEY RCBW")
         return self.block("REDUCER-ECCENTRIC", part, ends, "SKEY REBW", f"FLAT-DIRECTION {_flat(part.ports)}")
+
+
+def _said(part: Part) -> list[str]:
+    """Return what is noted of a part: its name, and whether nothing is seen of it."""
+    return [part.name, *(["assumed"] if isinstance(part.fitting, ResultJoint) else [])]
 
 
 def _angle(first: FloatArray, second: FloatArray) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,10 @@ from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import Cylinder, axis_basis
 from cylx.units import METRES
 
+SHARE = 16
+"""Bodies that the writer is given at a time: it goes through all that it has for each of them."""
+_DATA, _END = b"\nDATA;\n", b"ENDSEC;\n"
+_NUMBERS = re.compile(rb"'(?:[^']|'')*'|#(\d+)")
 _NO_TIME = "1970-01-01T00:00:00"
 _STAMP = re.compile(rb"(FILE_NAME\('[^']*',')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d")
 
@@ -30,36 +35,71 @@ def write(drawing: Drawing, suffix: str) -> Exported:
     """
     from OCP.Interface import Interface_Static  # noqa: PLC0415  an extra
     from OCP.Message import Message, Message_Gravity  # noqa: PLC0415  an extra
-    from OCP.STEPCAFControl import STEPCAFControl_Writer  # noqa: PLC0415  an extra
-    from OCP.STEPControl import STEPControl_Controller, STEPControl_StepModelType  # noqa: PLC0415  an extra
-    from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415  an extra
-    from OCP.TDocStd import TDocStd_Document  # noqa: PLC0415  an extra
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool  # noqa: PLC0415  an extra
+    from OCP.STEPControl import STEPControl_Controller  # noqa: PLC0415  an extra
 
     for printer in Message.DefaultMessenger_s().Printers():
         printer.SetTraceLevel(Message_Gravity.Message_Fail)  # otherwise it writes statistics to standard output
     unit = drawing.unit or "m"
-    document = TDocStd_Document(TCollection_ExtendedString("cylx"))
-    XCAFDoc_DocumentTool.SetLengthUnit_s(document, METRES[unit])
-    labels = [_add(document, body) for body in drawing.bodies]
     STEPControl_Controller.Init_s()  # the unit can only be set after this
     before = Interface_Static.CVal_s("write.step.unit")
     if not Interface_Static.SetCVal_s("write.step.unit", "M" if unit == "us-ft" else unit.upper()):  # STEP has it not
         raise RuntimeError(f"Open CASCADE does not know the unit {unit}")
+    bodies = drawing.bodies
     try:
-        writer = STEPCAFControl_Writer()
-        writer.SetColorMode(True)
-        writer.SetNameMode(True)
-        for label in labels:  # one by one: all at once their colours come in any order
-            writer.Transfer(label, STEPControl_StepModelType.STEPControl_AsIs)
-        stream = io.BytesIO()
-        writer.WriteStream(stream)
+        shares = [_share(bodies[k : k + SHARE], METRES[unit]) for k in range(0, len(bodies), SHARE)]
     finally:
         Interface_Static.SetCVal_s("write.step.unit", before)
-    text, stamps = _STAMP.subn(rb"\g<1>" + _NO_TIME.encode(), stream.getvalue(), count=1)
+    text, stamps = _STAMP.subn(rb"\g<1>" + _NO_TIME.encode(), _joined(shares), count=1)
     if stamps != 1:
         raise RuntimeError("Open CASCADE wrote no header that we know")
     return Exported(text)
+
+
+def _share(bodies: Sequence[Body], metres: float) -> bytes:
+    """Return some bodies as a file of their own, by the length of the unit in metres."""
+    from OCP.STEPCAFControl import STEPCAFControl_Writer  # noqa: PLC0415  an extra
+    from OCP.STEPControl import STEPControl_StepModelType  # noqa: PLC0415  an extra
+    from OCP.TCollection import TCollection_ExtendedString  # noqa: PLC0415  an extra
+    from OCP.TDocStd import TDocStd_Document  # noqa: PLC0415  an extra
+    from OCP.XCAFDoc import XCAFDoc_DocumentTool  # noqa: PLC0415  an extra
+
+    document = TDocStd_Document(TCollection_ExtendedString("cylx"))
+    XCAFDoc_DocumentTool.SetLengthUnit_s(document, metres)
+    labels = [_add(document, body) for body in bodies]
+    writer = STEPCAFControl_Writer()
+    writer.SetColorMode(True)
+    writer.SetNameMode(True)
+    for label in labels:  # one by one: all at once their colours come in any order
+        writer.Transfer(label, STEPControl_StepModelType.STEPControl_AsIs)
+    stream = io.BytesIO()
+    writer.WriteStream(stream)
+    return stream.getvalue()
+
+
+def _joined(files: Sequence[bytes]) -> bytes:
+    """Return files as one, with the header of the first: the numbers of each go on from those before it."""
+    parts: list[bytes] = []
+    most = 0
+    for number, text in enumerate(files):
+        top, begin, rest = text.partition(_DATA)
+        content, end, bottom = rest.rpartition(_END)
+        if not (begin and end):
+            raise RuntimeError("Open CASCADE wrote no data that we know")
+        first, seen = most, 0
+
+        def moved(match: re.Match[bytes], first: int = first) -> bytes:
+            nonlocal seen
+            if match[1] is None:  # a text
+                return match[0]
+            seen = max(seen, int(match[1]))
+            return b"#%d" % (first + int(match[1]))
+
+        content = _NUMBERS.sub(moved, content)
+        most += seen
+        parts += [top, begin, content] if number == 0 else [content]
+        if number == len(files) - 1:
+            parts += [end, bottom]
+    return b"".join(parts)
 
 
 def _add(document: Any, body: Body) -> Any:  # noqa: ANN401  OCP has no types

@@ -119,6 +119,9 @@ def fill_basis(direction: FloatArray, basis: FloatArray) -> None:
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a x b of vectors in the last axis, (..., 3) each; ten times faster than `numpy.cross` for few vectors."""
+    if a.ndim == b.ndim == 1:  # the same numbers, without arrays of one number
+        (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+        return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
     ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)

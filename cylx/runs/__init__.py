@@ -18,7 +18,7 @@ from cylx.runs.crossings import split_crossings
 from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
 from cylx.runs.onward import follow_ends
-from cylx.runs.parts import drop_parts, drop_twins
+from cylx.runs.parts import drop_parts, drop_turned, drop_twins
 from cylx.runs.pieces import settled
 from cylx.runs.pipes import Pipe, Surroundings
 from cylx.runs.roughness import rough_ones
@@ -89,6 +89,7 @@ def trace_runs(
     # a bend that was taken for two has both its pipes again
     add_bends(trace, near)
     add_reducers(trace, near)
+    trace = drop_turned(trace)
     add_assumed(trace, near)
     settle_chains(trace, near)
     settle_radii(trace)

@@ -23,6 +23,10 @@ ROUGH = 1.45
 """Points that scatter so many times more than those of the pipes are of no bend."""
 MOST_INSIDE = 0.5
 """Points inside the tube, or just beside its surface, for each point on it."""
+FURTHEST_TURN = math.radians(100.0)
+"""What turns by more may be two elbows in one plane, hardly apart: it is one if its surface is that of a torus."""
+MOST_DEVIATION, LEAST_IN_CELL, LEAST_CELLS = 0.015, 4, 8
+"""By how many radii pieces of the surface of an elbow deviate at most, in the mean; points of a piece; pieces."""
 BESIDE = 0.3
 """Points within so many radii of the surface are just beside it."""
 
@@ -107,6 +111,9 @@ def judged(
     rms = float(np.sqrt((errors[own] ** 2).mean()))
     if not one_bend or lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
         return None
+    about = own | beside
+    if bend.angle > FURTHEST_TURN and _deviates(bend, radius, near.points[indices[about]], rows[about], errors[about]):
+        return None
     coverage = _covered(bend, near.points[indices[own]], rows[own]) / (12.0 * pieces)
     of_bend = own & (along > -corner) & (along < bend.length + corner)
     turn = solved.covariance[2:4, 2:4] + solved.covariance[6:8, 6:8]
@@ -131,11 +138,29 @@ def judged(
     )
 
 
+def _deviates(bend: Bend, radius: float, points: FloatArray, rows: IndexArray, errors: FloatArray) -> bool:
+    """Return whether the surface of a bend clearly deviates from its torus, beside what noise leaves of the means."""
+    _, cells = np.unique(rows * 12 + _sectors(bend, points), return_inverse=True)
+    counts = np.bincount(cells)
+    means = np.bincount(cells, errors) / counts
+    noise = (np.bincount(cells, errors**2) / counts - means**2) / np.maximum(counts - 1, 1)
+    used = counts >= LEAST_IN_CELL
+    if used.sum() < LEAST_CELLS:
+        return False
+    square = means[used] ** 2
+    form, uncertain = float((square - noise[used]).mean()), math.sqrt(2.0 / used.sum()) * float(square.mean())
+    return form - 2.0 * uncertain > (MOST_DEVIATION * radius) ** 2
+
+
 def _covered(bend: Bend, points: FloatArray, rows: IndexArray) -> int:
     """Return how many cells of the surface of a bend hold points: each of its pieces has twelve about the tube."""
+    return len(np.unique(rows * 12 + _sectors(bend, points)))
+
+
+def _sectors(bend: Bend, points: FloatArray) -> IndexArray:
+    """Return the sector about the tube of points on a bend."""
     radial = points - (bend.meeting if bend.bend_radius == 0 else bend.center)
     # angle about the tube: from the outside of the bend
     high = radial @ bend.normal
     out = np.hypot(radial @ bend.first, radial @ bend.inward) - bend.bend_radius
-    sector = np.floor((np.arctan2(high, out) / (2 * math.pi) + 0.5) * 12).astype(np.int64) % 12
-    return len(np.unique(rows * 12 + sector))
+    return np.floor((np.arctan2(high, out) / (2 * math.pi) + 0.5) * 12).astype(np.int64) % 12

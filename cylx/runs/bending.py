@@ -16,7 +16,8 @@ from cylx.runs.meetings import Meeting
 from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings
 from cylx.runs.trials import fill_radius_costs
 
-MOST_POINTS = 900
+MOST_POINTS, FEW_POINTS = 900, 300
+"""Points in a fit, and in the trials before it."""
 TRIED = 28
 """Bend radii that are tried before the fit."""
 LOOSE = 0.02
@@ -61,10 +62,11 @@ def fit_meeting(meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings) -> 
     some = indices[:: max(1, len(indices) // MOST_POINTS)]
     points = near.points[some]
     tried = np.concatenate([[0.0], np.geomspace(min(0.4 * radius, most), most, TRIED)])
-    costs = _costs(meeting.bend, tried, points, radius, spread)
+    few = points[:: max(1, len(points) // FEW_POINTS)]
+    costs = _costs(meeting.bend, tried, few, radius, spread)
     best = int(costs.argmin())
     fine = np.linspace(tried[max(best - 1, 0)], tried[min(best + 1, TRIED)], 17)
-    costs = _costs(meeting.bend, fine, points, radius, spread)
+    costs = _costs(meeting.bend, fine, few, radius, spread)
     bend = replace(meeting.bend, bend_radius=float(fine[costs.argmin()]))
     _, distances = bend.coordinates(points)
     about = points[np.abs(distances - radius) < max(0.3 * radius, 2.0 * ON_SURFACE * spread)]

@@ -23,9 +23,9 @@ BESIDE = 0.3
 def split_crossings(pipes: list[Pipe], near: Surroundings) -> list[Pipe]:
     """Return the pipes with those cut in two that go through another: they are two branches that face each other."""
     out = list(pipes)
-    k = 0
+    k, lines = 0, _Lines(out)
     while k < len(out):
-        main = _crossed(out, k)
+        main = _crossed(out, k, lines)
         if main is not None:
             pipe, (center, sine) = out[k], main[1]
             depth = main[0].radius / sine
@@ -37,15 +37,38 @@ def split_crossings(pipes: list[Pipe], near: Surroundings) -> list[Pipe]:
             near.release(out[k])
             near.label(near.on(other), other.label)
             out.append(other)
+            lines = _Lines(out)
         else:
             k += 1
     return out
 
 
-def _crossed(pipes: Sequence[Pipe], k: int) -> tuple[Pipe, tuple[FloatArray, float]] | None:
+class _Lines:
+    """The axes of pipes as arrays: which of them a pipe may cross is asked of all at once."""
+
+    def __init__(self, pipes: Sequence[Pipe]) -> None:
+        self.middles = np.array([pipe.middle for pipe in pipes]).reshape(-1, 3)
+        self.directions = np.array([pipe.direction for pipe in pipes]).reshape(-1, 3)
+        self.lengths = np.array([pipe.length for pipe in pipes])
+        self.radii = np.array([pipe.radius for pipe in pipes])
+
+    def about(self, pipe: Pipe) -> list[int]:
+        """Return the pipes that are near enough, at an angle, with axes that pass no farther than a radius."""
+        apart = self.middles - pipe.middle
+        reach = 0.5 * (self.lengths + pipe.length) + np.maximum(self.radii, pipe.radius)
+        normals = np.cross(self.directions, pipe.direction)
+        square = np.einsum("ij,ij->i", normals, normals)
+        near = np.einsum("ij,ij->i", apart, apart) <= reach**2
+        near &= square > (0.99 * math.sin(CROSSING)) ** 2
+        near &= np.einsum("ij,ij->i", apart, normals) ** 2 <= square * np.maximum(self.radii, pipe.radius) ** 2
+        return [int(j) for j in np.flatnonzero(near)]
+
+
+def _crossed(pipes: Sequence[Pipe], k: int, lines: _Lines) -> tuple[Pipe, tuple[FloatArray, float]] | None:
     """Return the pipe that a pipe goes through, where, and the sine of the angle between them; None for none."""
     pipe = pipes[k]
-    for j, main in enumerate(pipes):
+    for j in lines.about(pipe):
+        main = pipes[j]
         if j == k or pipe.radius > EQUAL * main.radius:
             continue
         found = crossing_of(pipe, main)
@@ -73,8 +96,9 @@ def crossing_of(pipe: Pipe, main: Pipe) -> tuple[FloatArray, float] | None:
 
 def equal_crossings(pipes: Sequence[Pipe], aside: set[int]) -> Iterator[tuple[int, int, FloatArray, float]]:
     """Yield the pairs of pipes of about one radius that go through each other, where, and the sine of the angle."""
+    lines = _Lines(pipes)
     for k, pipe in enumerate(pipes):
-        for j in range(k):
+        for j in (one for one in lines.about(pipe) if one < k):
             main = pipes[j]
             equal = min(pipe.radius, main.radius) > EQUAL * max(pipe.radius, main.radius)
             if equal and not {j, k} & aside:

@@ -23,6 +23,9 @@ OVERSHOOT = 1.5
 LOW_TURN = 0.4
 """And over this, in radii, times the tangent of half the angle: a pipe hardly leaves a bend of a small angle."""
 
+COMMON = 0.5
+"""Straights may end so many radii beyond the last point that is on both of them."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Meeting:
@@ -88,7 +91,8 @@ def _meeting(one: Pipe, end: End, two: Pipe, other: End) -> tuple[Bend, tuple[fl
     if float(np.linalg.norm(feet[0] - feet[1])) > SKEW * radius + ON_SURFACE * uncertain:
         return None
     ahead = float((feet[0] - one.at(end)) @ first), float((two.at(other) - feet[1]) @ second)
-    over = max(OVERSHOOT + LOW_TURN / math.tan(0.5 * turn), 0.5 + 2.0 / math.tan(turn)) * radius
+    # two tubes of one size have points in common up to a radius over the tangent of half the angle behind the corner
+    over = max(OVERSHOOT + LOW_TURN / math.tan(0.5 * turn), COMMON + 1.0 / math.tan(0.5 * turn)) * radius
     if min(ahead) < -over or max(ahead) > REACH * radius:
         return None
     return Bend(0.5 * (feet[0] + feet[1]), first, second, 0.0), ahead

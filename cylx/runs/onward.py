@@ -13,8 +13,10 @@ from cylx.runs.bend import Bend
 from cylx.runs.bend_evidence import FittedBend, judged
 from cylx.runs.bend_fit import Solved, refined
 from cylx.runs.elbows import add_bends, add_fitted
+from cylx.runs.flatness import is_flat
 from cylx.runs.narrowing import narrowed
 from cylx.runs.pipes import ENDS, ON_SURFACE, End, Pipe, Surroundings, turned
+from cylx.runs.prolonging import prolonged
 from cylx.runs.tracing import Trace
 from cylx.runs.trials import fill_bend_scores
 
@@ -71,18 +73,29 @@ def follow_ends(trace: Trace, near: Surroundings) -> int:
             if found is None or found[1].bend.angle < SLIGHT:
                 other = narrowed(trace.pipes[index], end, near)
             if other is not None and (found is None or other[1] > found[2]):
-                trace.pipes.append(other[0])
-                near.label(near.on(other[0]), other[0].label)
+                _add(trace, other[0], trace.pipes[index], near)
                 count += 1
             elif found is not None:
                 pipe, bend, _ = found
                 trace.pipes.append(pipe)
                 add_fitted(trace, [bend])
-                near.label(near.on(trace.pipes[-1]), pipe.label)
+                _add(trace, trace.pipes.pop(), trace.pipes[index], near)
                 # it may end at a pipe that is known: that one need not be followed
                 add_bends(trace, near, frozenset({len(trace.pipes) - 1}))
                 count += 1
     return count
+
+
+def _add(trace: Trace, pipe: Pipe, before: Pipe, near: Surroundings) -> None:
+    """Add a pipe that goes on from another, as far as its points go."""
+    end: End = "end" if _apart(pipe.end, before) > _apart(pipe.start, before) else "start"
+    trace.pipes.append(prolonged(pipe, end, near))
+    near.label(near.on(trace.pipes[-1]), pipe.label)
+
+
+def _apart(place: FloatArray, pipe: Pipe) -> float:
+    """Return how far a place is from the nearer end of a pipe."""
+    return min(float(np.linalg.norm(place - pipe.at(end))) for end in ENDS)
 
 
 def onward_bend(
@@ -134,7 +147,7 @@ def onward_bend(
     if (beyond & (np.abs(distances - radius) < ON_SURFACE * pipe.spread)).sum() < LEAST_ON_STRAIGHT:
         return None
     fitted = judged((index, number), (end, joined), solved, indices, near, pipe.spread)
-    if fitted is None:
+    if fitted is None or is_flat(found, near):
         return None
     # the new pipe is where the fit has it already
     shifts = fitted.shifts.copy()

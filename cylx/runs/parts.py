@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from cylx.geometry.arrays import FloatArray
-from cylx.records import Elbow, Flange, Inline, Junction
+from cylx.records import Elbow, Flange, Inline, Junction, Reducer
 from cylx.runs.pieces import is_twin
 from cylx.runs.pipes import ENDS, Pipe
 from cylx.runs.tracing import Trace
@@ -54,6 +54,31 @@ def drop_twins(trace: Trace) -> Trace:
             if any(is_twin(pipe, pipes[j]) for j in rivals):
                 twins.add(k)
     return _without(trace, twins) if twins else trace
+
+
+def drop_turned(trace: Trace) -> Trace:
+    """Return what was traced without the fittings of turned parts, such as a pin with a cone, or a bottle.
+
+    Of these, nothing but reducers joins pieces of one line, none of which is as long as a pipe.
+    """
+    group = list(range(len(trace.pipes)))
+    for fitting in trace.fittings:
+        old, new = {group[k] for k in fitting.joins}, group[fitting.joins[0]]
+        group = [new if one in old else one for one in group]
+    pipes = {group[k] for k, pipe in enumerate(trace.pipes) if pipe.length >= LEAST_ALONE * pipe.radius}
+    others = {group[one.joins[0]] for one in trace.fittings if len(one.joins) > 1 and not isinstance(one, Reducer)}
+    reduced = {group[one.joins[0]] for one in trace.fittings if isinstance(one, Reducer)}
+    turned = reduced - pipes - others
+    if not turned:
+        return trace
+    out = Trace(trace.pipes, trace.near, others=trace.others, followed=trace.followed)
+    out.starts = trace.starts
+    for fitting, points in zip(trace.fittings, trace.points, strict=True):
+        if group[fitting.joins[0]] in turned:
+            trace.near.label(points, -1)
+        else:
+            out.add(fitting, points)
+    return out
 
 
 def _is_first(one: Pipe, number: int, other: Pipe, index: int) -> bool:

@@ -29,6 +29,9 @@ DEPTH = 4
 """Times that the rest of a pipe is looked at for more pieces."""
 LONGEST_HIDDEN = 20.0
 """Pieces of one pipe are joined across gaps up to so many radii."""
+DEEP, FEW = 0.1, 0.005
+"""Points so many radii inside a pipe, and clearly off its surface, are of something within; no more than this share of
+those on it are of none."""
 PARALLEL = math.cos(math.radians(5.0))
 
 
@@ -50,6 +53,7 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
         pieces = [] if rough else _pieces(pipe, near, [other for other in pipes if other is not pipe], DEPTH)
         if any(is_rough(piece, near) for piece in pieces):
             pieces = []
+        pieces = [_seen_anew(piece, pipe, near) for piece in pieces]
         if sum(abs(piece.radius - pipe.radius) < ONE_RADIUS * pipe.radius for piece in pieces) > MOST_PIECES:
             pieces, pipe = [], replace(pipe, is_other=True)
         first = max(pieces, key=lambda one: one.length) if pieces else pipe
@@ -65,6 +69,19 @@ def settled(pipes: Sequence[Pipe], near: Surroundings) -> list[Pipe]:
     for pipe in more:
         near.label(near.on(pipe), pipe.label)
     return _rejoined(out + more, near) if more else out
+
+
+def _seen_anew(piece: Pipe, pipe: Pipe, near: Surroundings) -> Pipe:
+    """Return a piece of a pipe with the side from which it is seen.
+
+    If two pipes were taken for one that is as wide as the wider of them, points of the other are inside it, as things
+    are in a bore.
+    """
+    if not (pipe.is_other and is_unsure(pipe)) or pipe.length - piece.length < CUT * pipe.radius:
+        return piece
+    half, off = 0.5 * piece.length, max(4.5 * piece.spread, DEEP * piece.radius)
+    within = near.about(piece.middle, piece.direction, -half, half, piece.radius - off)
+    return replace(piece, is_other=len(within) > FEW * len(near.on(piece, (pipe.label,))))
 
 
 def _rejoined(pipes: list[Pipe], near: Surroundings) -> list[Pipe]:

@@ -180,9 +180,13 @@ class Surroundings:
     """
 
     def __init__(self, points: FloatArray, labels: NDArray[np.int32], spacing: float, noise: float) -> None:
-        self.origin = 0.5 * (points.min(axis=0) + points.max(axis=0)) if len(points) else np.zeros(3)
-        corner = points.min(axis=0) if len(points) else np.zeros(3)
-        side = float(np.ptp(points, axis=0).max()) if len(points) else 1.0
+        # column by column: along the first axis of three columns the same takes ten times as long
+        corner, top = (
+            np.array([getattr(column, what)() for column in points.T]) if len(points) else np.zeros(3)
+            for what in ("min", "max")
+        )
+        self.origin = 0.5 * (corner + top)
+        side = float((top - corner).max()) if len(points) else 1.0
         unit = max(0.5 * spacing, side / (2.0**BITS - 2), 1e-300)
         codes = morton_codes(points - corner, unit)
         self.order = np.argsort(codes, kind="stable")
@@ -193,10 +197,7 @@ class Surroundings:
         self._next = int(self.labels.max(initial=-1)) + 1000
         self.cells = Cells(self.points, codes[self.order]) if len(points) else None
         self.spacing, self.noise = spacing, noise
-        self.low, self.high = (
-            corner - self.origin,
-            corner + np.ptp(points, axis=0) - self.origin if len(points) else corner,
-        )
+        self.low, self.high = corner - self.origin, top - self.origin
 
     def origin_points(self, indices: IndexArray) -> FloatArray:
         """Return points of the cloud, by their indices in it, in coordinates about its middle."""

@@ -12,7 +12,10 @@ from scipy.spatial.transform import Rotation
 from cylx.export import METRES, draw, format_of, render
 from cylx.export.formats import FORMATS
 from cylx.export.meshes import Z_UP
+from cylx.export.step import SHARE
+from cylx.geometry.cylinder import Cylinder
 from cylx.palette import cylinder_colors
+from cylx.results.fittings import ResultJoint
 from tests.export.test_export import VOLUME, library, step_solids
 from tests.support.pcf import read_pcf
 from tests.support.piping import LINKS, VOLUMES, piping
@@ -97,6 +100,16 @@ def test_step_has_tori_and_cones(unit, tmp_path):
     scale = METRES[unit] / METRES["mm"]
     for name, (volume, _) in zip(names, step_solids(data, tmp_path), strict=True):
         assert volume == pytest.approx(VOLUMES[name] * scale**3, rel=2e-4), name
+
+
+def test_step_of_many_parts_has_each_number_once():
+    library(".step")
+    text = re.sub(r"'(?:[^']|'')*'", "''", export(".step").decode("ascii"))
+    defined = [int(number) for number in re.findall(r"^#(\d+) = ", text, re.MULTILINE)]
+    assert len(VOLUMES) > SHARE
+    assert defined == list(range(1, len(defined) + 1))
+    assert {int(number) for number in re.findall(r"#(\d+)", text)} == set(defined)
+    assert text.count("= PRODUCT(") == text.count("= STYLED_ITEM(") == len(VOLUMES)
 
 
 def places_of(model, products):
@@ -316,6 +329,61 @@ def test_a_joint_without_a_gap_has_no_body_and_still_joins():
     assert len(model.by_type("IfcRelConnectsPorts")) == LINKS
     document = ezdxf.read(io.StringIO(export(".dxf", change=closed).decode()))
     assert (document.audit().errors, document.audit().fixes) == ([], [])
+
+
+def around_a_corner(cylinders, fittings, runs):
+    """Let a gap be where elbow 4 is, of which the first end was seen to be farther from the corner."""
+    (elbow,) = (one for one in fittings if one.id == 4)
+    away = np.array(elbow.start) - elbow.center
+    onward = np.cross(elbow.normal, away)  # as long as the bend radius
+    joint = ResultJoint(
+        **elbow.model_dump(include={"id", "joins", "ends", "confidence", "inliers", "rms", "coverage", "std"}),
+        kind="joint",
+        start=(np.array(elbow.start) - 0.5 * onward).tolist(),
+        end=elbow.end,
+        length=0.3,
+        assumed=True,
+    )
+    return cylinders, [joint if one.id == 4 else one for one in fittings], runs
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_a_gap_around_a_corner_is_drawn_as_the_bend_that_is_missing(unit):
+    how = {"rotation": TURN, "scale": 1.0 / METRES[unit]}
+    plain, bent = (drawing_of(unit, change=change, **how).piping.parts for change in (None, around_a_corner))
+    (elbow,), (joint,) = (
+        [one for one in parts if one.name == name] for parts, name in ((plain, "elbow 4"), (bent, "joint 4"))
+    )
+    (torus,), (drawn,) = elbow.solids, joint.solids
+    for what in ("center", "normal", "start", "angle", "radius"):
+        np.testing.assert_allclose(getattr(drawn, what), getattr(torus, what), rtol=1e-9, atol=1e-9 / METRES[unit])
+    for one, other in zip(joint.ports, elbow.ports, strict=True):
+        np.testing.assert_allclose(one.place, other.place, atol=1e-9 / METRES[unit])
+    _, pipelines = read_pcf(export(".pcf", unit=unit, change=around_a_corner, **how))
+    (component,) = (one for one in pipelines["run-0"] if one.values["COMPONENT-ATTRIBUTE1"] == "joint 4")
+    assert component.kind == "ELBOW"
+    assert component.values["COMPONENT-ATTRIBUTE2"] == "assumed"
+    assert float(component.values["BEND-RADIUS"]) == pytest.approx(200.0)
+    model = library(".ifc").file.from_string(export(".ifc", unit=unit, change=around_a_corner, **how).decode())
+    (fitting,) = (one for one in model.by_type("IfcPipeFitting") if one.Name == "joint 4")
+    assert (fitting.PredefinedType, fitting.ObjectType) == ("BEND", "joint")
+    (disk,) = (
+        one for shape in fitting.Representation.Representations for one in shape.Items if one.is_a("IfcSweptDiskSolid")
+    )
+    assert disk.Directrix.BasisCurve.Radius == pytest.approx(0.2 / METRES[unit])
+
+
+def test_step_has_the_torus_of_a_gap_around_a_corner():
+    library(".step")
+    text = export(".step", change=around_a_corner).decode("ascii")
+    assert text.count("TOROIDAL_SURFACE(") == 2
+
+
+def test_a_gap_in_a_line_is_drawn_straight():
+    (joint,) = (one for one in drawing_of(rotation=TURN).piping.parts if one.name == "joint 9")
+    (rod,) = joint.solids
+    assert isinstance(rod, Cylinder)
+    assert rod.height == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".glb", ".stl", ".csv", ".ifc", ".dxf", ".pcf"])
