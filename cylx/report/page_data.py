@@ -52,14 +52,14 @@ def page_data_of(
         the unrolled surface of each cylinder; `parts`, the bill of quantities, None without runs.
     """
     content = result or Result.of(extraction)
-    result = content.to_object()
-    del result["config"]
+    listed = content.to_object()
+    del listed["config"]
     view = View.of(extraction)
     table = extraction.cloud.table
     rejected = [RejectedCylinder.of(one).model_dump(mode="json") for one in extraction.rejected[:MOST_REJECTED]]
     drop_missing(rejected)
     return {
-        "result": result,
+        "result": listed,
         "config": plain_yaml(extraction.config),
         "fields": ["x", "y", "z"] if table is None else list(table.dtype.names or ()),
         "rejected": rejected,
