@@ -27,9 +27,9 @@ from cylx.tiles.schedule import Runner
 from cylx.tiles.search import WHOLE, Plan, found_in, points_name, search_tile
 from cylx.tiles.tree import usual_side
 
-BASE, A_POINT = 300_000_000, 220
-"""Estimate of the peak memory of the search of a tile, and per point of it and its margin, bytes: a whole cloud of
-three million points takes less, 855 MB in all."""
+BASE, A_POINT = 300_000_000, 250
+"""Estimate of the peak memory of the search of a tile, and per point of it and its margin, bytes: two million points in
+tiles of a plant took 830 MB."""
 OVERHEAD = 1.6
 """Points of a tile with its margin over those without, at the most, usually."""
 LEAST_POINTS, MOST_POINTS = 20_000, 8_000_000
