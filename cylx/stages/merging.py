@@ -178,7 +178,8 @@ def _is_another_size(a: Finding, b: Finding, gap: float) -> bool:
     one, two = a.segment, b.segment
     if gap <= 2.0 * max(one.half, two.half):
         return False
-    certain = ERRORS_OF_OFFSET * math.hypot(a.offset_error, b.offset_error)  # a radius is known about as well as an axis
+    # a radius is known about as well as an axis
+    certain = ERRORS_OF_OFFSET * math.hypot(a.offset_error, b.offset_error)
     return abs(one.radius - two.radius) > max(LEAST_RADIUS_DIFFERENCE * min(one.radius, two.radius), certain)
 
 
