@@ -36,6 +36,7 @@ def extract_tiled(
     scratch: str | PathLike[str] | None = None,
     scheduler: str | None = None,
     labels: str | PathLike[str] | None = None,
+    rejected: bool = False,
     preset: str | None = None,
     config: Config | str | PathLike[str] | None = None,
     overrides: Sequence[str] = (),
@@ -67,6 +68,8 @@ def extract_tiled(
         Address of a scheduler of Dask, whose workers search the tiles; by default this process does.
     labels : str or Path, optional
         A new NPY file, for the `cylinder_id` and the `residual` of each row of the source.
+    rejected : bool
+        Whether to give what was not accepted, too.
     preset, config, overrides, seed, radius, max_cylinders, crop, every, classes, observer
         As for `extract`.
     threads : int
@@ -111,7 +114,7 @@ def extract_tiled(
         runner: Runner = Here() if scheduler is None else stack.enter_context(closing(Cluster(scheduler)))
         folder = stack.enter_context(open_scratch(parent, "result", {}, resume=False))
         clouds = _clouds_of(source, folder)
-        options = Options(tile, buffer, memory, threads)
+        options = Options(tile, buffer, memory, threads, rejected)
         outcome = extract_in_tiles(clouds, selection, settings, options, folder, runner, observer)
         if labels is not None:
             _write_labels(Path(labels), outcome)

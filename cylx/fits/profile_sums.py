@@ -39,6 +39,8 @@ ABOUT = 0.35
 """What lies within so many radii of the arc is compared with it."""
 CENTER_X, CENTER_Y, OWN, FIRST, LAST = range(5)
 """The unknowns: centre, radius, and the directions of the two ends of the arc."""
+KNOWN = 7
+"""Numbers that follow from the directions, the same for all points."""
 
 
 @njit(cache=True, nogil=True)
@@ -48,26 +50,28 @@ def _place(x: float, y: float, profile: FloatArray, normals: FloatArray) -> tupl
     What: 0 for the arc, 1 for the line at its last end, -1 for the one at its first.
     """
     x, y = x - profile[CENTER_X], y - profile[CENTER_Y]
-    middle = 0.5 * (profile[FIRST] + profile[LAST])
-    away = math.atan2(y, x) - middle
-    away -= 2.0 * math.pi * math.floor(away / (2.0 * math.pi) + 0.5)
-    if abs(away) <= 0.5 * (profile[LAST] - profile[FIRST]):
-        return 0, math.sqrt(x * x + y * y) - profile[OWN], 0.0
-    k = 2 if away > 0.0 else 0
+    distance = math.sqrt(x * x + y * y)
+    if x * normals[4] + y * normals[5] >= normals[6] * distance:  # nearer to the middle than an end of the arc is
+        return 0, distance - profile[OWN], 0.0
+    k = 2 if y * normals[4] - x * normals[5] > 0.0 else 0
     along = y * normals[k] - x * normals[k + 1]
     return (1 if k else -1), x * normals[k] + y * normals[k + 1] - profile[OWN], along if k else -along
 
 
 @njit(cache=True, nogil=True)
 def _fill_normals(profile: FloatArray, normals: FloatArray) -> None:
+    """Fill in the directions of the two ends of the arc and of its middle, and the cosine of half its angle."""
+    middle = 0.5 * (profile[FIRST] + profile[LAST])
     normals[0], normals[1] = math.cos(profile[FIRST]), math.sin(profile[FIRST])
     normals[2], normals[3] = math.cos(profile[LAST]), math.sin(profile[LAST])
+    normals[4], normals[5] = math.cos(middle), math.sin(middle)
+    normals[6] = math.cos(0.5 * (profile[LAST] - profile[FIRST]))
 
 
 @njit(cache=True, nogil=True)
 def settle(local: FloatArray, profile: FloatArray, radius: float, reaches: FloatArray, deviation: float) -> bool:
     """Fit a profile in place, by Gauss-Newton steps with Tukey's weights; return whether it is one."""
-    matrix, right, row, normals = np.zeros((5, 5)), np.zeros(5), np.zeros(5), np.zeros(4)
+    matrix, right, row, normals = np.zeros((5, 5)), np.zeros(5), np.zeros(3), np.zeros(KNOWN)
     for step in range(STEPS):
         width = TUKEY * deviation * max(1.0, WIDER * NARROWED**step)
         matrix[:], right[:] = 0.0, 0.0
@@ -76,20 +80,25 @@ def settle(local: FloatArray, profile: FloatArray, radius: float, reaches: Float
             kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
             if abs(residual) >= width or along < 0.0 or along > reaches[1 if kind > 0 else 0]:
                 continue
-            row[OWN], row[FIRST], row[LAST] = -1.0, 0.0, 0.0
             if kind == 0:
                 x, y = local[i, 0] - profile[CENTER_X], local[i, 1] - profile[CENTER_Y]
                 distance = max(residual + profile[OWN], 1e-12 * profile[OWN])
-                row[CENTER_X], row[CENTER_Y] = -x / distance, -y / distance
+                row[CENTER_X], row[CENTER_Y], row[OWN] = -x / distance, -y / distance, -1.0
             else:
                 k = 2 if kind > 0 else 0
-                row[CENTER_X], row[CENTER_Y] = -normals[k], -normals[k + 1]
-                row[LAST if kind > 0 else FIRST] = kind * along
+                row[CENTER_X], row[CENTER_Y], row[OWN] = -normals[k], -normals[k + 1], -1.0
             weight = (1.0 - (residual / width) ** 2) ** 2
-            for a in range(5):
+            for a in range(FIRST):
                 right[a] -= weight * row[a] * residual
-                for b in range(5):
+                for b in range(FIRST):
                     matrix[a, b] += weight * row[a] * row[b]
+            if kind != 0:  # a line turns with its end of the arc alone
+                end, turned = LAST if kind > 0 else FIRST, kind * along
+                right[end] -= weight * turned * residual
+                matrix[end, end] += weight * turned * turned
+                for b in range(FIRST):
+                    matrix[end, b] += weight * turned * row[b]
+                    matrix[b, end] += weight * row[b] * turned
         for a in range(5):
             matrix[a, a] = matrix[a, a] * (1.0 + 1e-9) + 1e-12
         if not solve_in_place(matrix, right):
@@ -114,7 +123,7 @@ def is_straight(
     local: FloatArray, profile: FloatArray, side: int, reach: float, further: float, deviation: float
 ) -> bool:
     """Return whether the line at one end of an arc goes on straight from one length to another."""
-    normals = np.zeros(4)
+    normals = np.zeros(KNOWN)
     _fill_normals(profile, normals)
     own, near, close, total = 0, 0, 0, 0.0
     for i in range(len(local)):
@@ -145,7 +154,7 @@ def lean(
     right: FloatArray,
 ) -> None:
     """Sum up the normal equations of the lean of the axis, with Tukey's weights."""
-    normals, width = np.zeros(4), TUKEY * deviation
+    normals, width = np.zeros(KNOWN), TUKEY * deviation
     _fill_normals(profile, normals)
     for i in range(len(local)):
         kind, residual, along = _place(local[i, 0], local[i, 1], profile, normals)
@@ -174,7 +183,7 @@ def explained(local: FloatArray, profile: FloatArray, reaches: FloatArray, devia
 
     In the sum, what is on no part of the profile counts as far.
     """
-    normals = np.zeros(4)
+    normals = np.zeros(KNOWN)
     _fill_normals(profile, normals)
     total, own, count = 0.0, 0.0, 0
     for i in range(len(local)):
@@ -198,7 +207,7 @@ def seen(
     Points on the upper and on the lower line, clear of the arc, on the arc, and about it; of these the sum of squares,
     clipped; and what the arc gains over its two lines.
     """
-    normals = np.zeros(4)
+    normals = np.zeros(KNOWN)
     _fill_normals(profile, normals)
     upper, lower, on_arc, about = 0, 0, 0, 0
     squares, edge = 0.0, 0.0

@@ -82,6 +82,10 @@ class Scratch:
         values = np.fromfile(self.path(name), dtype) if self.has(name) else np.empty(0, dtype)
         return values.reshape(-1, width) if width > 1 else values
 
+    def size(self, name: str, dtype: DTypeLike) -> int:
+        """Return the number of values of a file without a header; none if it is not there."""
+        return self.path(name).stat().st_size // np.dtype(dtype).itemsize if self.has(name) else 0
+
     def mapped(self, name: str, dtype: DTypeLike) -> NDArray[Any]:
         """Map a file without a header into memory."""
         path = self.path(name)

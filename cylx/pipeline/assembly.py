@@ -14,7 +14,6 @@ from cylx.records import (
     CylinderFit,
     Extraction,
     Finding,
-    Frame,
     IndexedCloud,
     NominalRadius,
     PointCloud,
@@ -75,7 +74,7 @@ def assemble(
     if blends is not None and verified and config.verification.blends:
         arcs = tuple(_blends(blends, labels, prepared, indexed))
     lost = [RejectedSegment.of(findings[i], "claimed by a better one") for i in np.flatnonzero(counts == 0)]
-    shown = tuple(_rejected([*rejected, *lost], frame, indexed, verified=verified, game=game))
+    shown = tuple(rejected_fits([*rejected, *lost], prepared, indexed))
     return Extraction(tuple(fits), *in_cloud, cloud, scene, tuple(reports), config, warnings, shown, arcs)
 
 
@@ -153,11 +152,18 @@ def _nominal(finding: Finding, config: Config, spacing: float) -> NominalRadius 
     )
 
 
-def _rejected(
-    segments: list[RejectedSegment], frame: Frame, indexed: IndexedCloud, *, verified: bool, game: bool
-) -> list[RejectedFit]:
-    """Put what was not accepted into scene units, the most trusted first; what has no shape at all is left out."""
-    out = []
+def rejected_fits(segments: list[RejectedSegment], prepared: Prepared, indexed: IndexedCloud) -> list[RejectedFit]:
+    """Put what was not accepted into scene units, the most trusted first; what has no shape at all is left out.
+
+    Parameters
+    ----------
+    segments : list of RejectedSegment
+    prepared : Prepared
+    indexed : IndexedCloud
+    """
+    frame, config, out = prepared.frame, prepared.config, []
+    game = config.method == "gt"
+    verified = config.verification.enabled and game
     for one in segments:
         segment = one.segment
         if not (np.isfinite(segment.model).all() and segment.radius > 0.0 and segment.half >= 0.0):
@@ -175,7 +181,12 @@ def _rejected(
             form=_form(one, frame.spacing),
         )
         out.append(RejectedFit(fit, one.reason))
-    return sorted(out, key=lambda one: (one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers))
+    return sorted(out, key=by_trust)
+
+
+def by_trust(one: RejectedFit) -> tuple[bool, float, int]:
+    """Return what sorts the rejected: by confidence, then inliers; those not measured come last."""
+    return one.fit.confidence is None, -(one.fit.confidence or 0.0), -one.fit.inliers
 
 
 def _contradicted(config: Config, fits: list[CylinderFit]) -> list[str]:

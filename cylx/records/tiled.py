@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from cylx.geometry.arrays import FloatArray
 from cylx.records.clouds import Scene
-from cylx.records.cylinders import CylinderFit, arrays_of
+from cylx.records.cylinders import CylinderFit, RejectedFit, arrays_of
 from cylx.records.progress import StageReport
 from cylx.records.sources import Selection, Source
 from cylx.wording import counted
@@ -71,6 +71,9 @@ class TiledExtraction:
         What a user should know before trusting the result.
     blends : tuple of CylinderFit or None
         Arcs that go on tangentially, ordered as the cylinders; None if they were not looked for.
+    rejected : tuple of RejectedFit
+        The rejected cylinders, as those of `Extraction`, if they were asked for. Where tiles adjoin, some may be told
+        by both.
     """
 
     cylinders: tuple[CylinderFit, ...]
@@ -84,6 +87,7 @@ class TiledExtraction:
     tiling: Tiling
     warnings: tuple[str, ...] = ()
     blends: tuple[CylinderFit, ...] | None = None
+    rejected: tuple[RejectedFit, ...] = ()
 
     def __repr__(self) -> str:
         found = counted(len(self.cylinders), len(self.blends or ()))

@@ -13,9 +13,10 @@ from cylx.report.page_data import page_data_of
 
 if TYPE_CHECKING:
     from cylx.records import Extraction
+    from cylx.results import Result
 
 
-def html_of(extraction: Extraction) -> str:
+def html_of(extraction: Extraction, *, result: Result | None = None, points: int | None = None) -> str:
     """Return an extraction as an HTML page.
 
     The page has the cloud and the cylinders in 3-D, their table, a map of the residuals of each, the rejected fits with
@@ -26,13 +27,17 @@ def html_of(extraction: Extraction) -> str:
     ----------
     extraction : Extraction
         The output of a run.
+    result : Result, optional
+        Of the whole, if the extraction has a sample of its points.
+    points : int, optional
+        Number of points of the whole.
 
     Returns
     -------
     str
         HTML, to be written as UTF-8.
     """
-    return page_of(page_data_of(extraction))
+    return page_of(page_data_of(extraction, result=result, points=points))
 
 
 def page_of(page_data: dict[str, Any]) -> str:

@@ -29,7 +29,9 @@ NOISES = 8.0
 _OUTLYING = 0.005  # share of the points at either end of a coordinate that the first view may leave out
 
 
-def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict[str, Any]:
+def page_data_of(
+    extraction: Extraction, most_points: int = MOST_POINTS, *, result: Result | None = None, points: int | None = None
+) -> dict[str, Any]:
     """Return the content of a report.
 
     Parameters
@@ -37,6 +39,10 @@ def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict
     extraction : Extraction
     most_points : int
         Maximum number of points shown.
+    result : Result, optional
+        Of the whole, if the extraction has a sample of its points.
+    points : int, optional
+        Number of points of the whole.
 
     Returns
     -------
@@ -45,20 +51,20 @@ def page_data_of(extraction: Extraction, most_points: int = MOST_POINTS) -> dict
         `fields`, the properties of the input; the first `rejected`, of `rejected_count`; `view`, the drawing; `maps`,
         the unrolled surface of each cylinder; `parts`, the bill of quantities, None without runs.
     """
-    content = Result.of(extraction)
-    result = content.to_object()
-    del result["config"]
+    content = result or Result.of(extraction)
+    listed = content.to_object()
+    del listed["config"]
     view = View.of(extraction)
     table = extraction.cloud.table
     rejected = [RejectedCylinder.of(one).model_dump(mode="json") for one in extraction.rejected[:MOST_REJECTED]]
     drop_missing(rejected)
     return {
-        "result": result,
+        "result": listed,
         "config": plain_yaml(extraction.config),
         "fields": ["x", "y", "z"] if table is None else list(table.dtype.names or ()),
         "rejected": rejected,
         "rejected_count": len(extraction.rejected),
-        "view": view_of(view, most_points),
+        "view": view_of(view, most_points) | ({} if points is None else {"total": points}),
         "maps": maps_of(view),
         "parts": None if content.runs is None else _parts(content),
     }

@@ -14,7 +14,7 @@ from cylx.results.parts import Input, Part, drop_missing, text_of
 from cylx.version import __version__
 
 if TYPE_CHECKING:
-    from cylx.records import Extraction, RejectedFit
+    from cylx.records import Extraction, RejectedFit, TiledExtraction
 
 
 class Reasoned(Part):
@@ -50,12 +50,12 @@ class Rejections(Part):
     """The rejected cylinders, by confidence; those rejected before measuring come last."""
 
     @classmethod
-    def of(cls, extraction: Extraction) -> Rejections:
+    def of(cls, extraction: Extraction | TiledExtraction) -> Rejections:
         """Describe the rejections of an extraction.
 
         Parameters
         ----------
-        extraction : Extraction
+        extraction : Extraction or TiledExtraction
             The output of a run.
         """
         return cls(

@@ -60,7 +60,8 @@ def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], 
         narrowed = refit(narrowed)
     known = [one for one in (segment, narrowed) if not isinstance(one, str)]
     profiles = (_with_profile(one, indexed) for one in known)
-    return [*[one for one in profiles if one is not None][:1], *known[1:]]
+    first = next((one for one in profiles if one is not None), None)
+    return [*([] if first is None else [first]), *known[1:]]
 
 
 def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:

@@ -169,6 +169,20 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
     return square < MOST_CHI_SQUARE_IN_LINE
 
 
+def _is_another_size(a: Finding, b: Finding, gap: float) -> bool:
+    """Return whether a piece that lies further away than either is long has another radius, beyond their errors.
+
+    Over so long a gap, pipes that lie in line by chance are as likely as one pipe; one fit may explain both within the
+    noise though each of them is known much better than that.
+    """
+    one, two = a.segment, b.segment
+    if gap <= 2.0 * max(one.half, two.half):
+        return False
+    # a radius is known about as well as an axis
+    certain = ERRORS_OF_OFFSET * math.hypot(a.offset_error, b.offset_error)
+    return abs(one.radius - two.radius) > max(LEAST_RADIUS_DIFFERENCE * min(one.radius, two.radius), certain)
+
+
 def _is_bridged(indexed: IndexedCloud, model: FloatArray, half: float, width: float) -> bool:
     """Return whether points lie on a cylinder about its middle, and almost none beside its surface."""
     reach = model[RADIUS] + max(0.5 * model[RADIUS], 4.0 * width)
@@ -186,7 +200,7 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
     across = two.point - one.point
     height = float(across @ one.direction)
     gap, model = abs(height) - one.half - two.half, one.model.copy()
-    if are_distinct(a, b, indexed, gap):
+    if are_distinct(a, b, indexed, gap) or _is_another_size(a, b, gap):
         return None
     far = gap > FAR_APART * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
     if far:

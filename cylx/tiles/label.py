@@ -15,7 +15,7 @@ from cylx.pipeline.joining import label_part
 from cylx.records import IndexedCloud, Noise
 from cylx.tiles.gather import touches
 from cylx.tiles.parts import Part, in_frame
-from cylx.tiles.search import Plan, frame_name, frame_points, inside_of, rows_name
+from cylx.tiles.search import Plan, frame_name, frame_points, inside_of, points_name, rows_name
 
 FINAL = "final.json"
 """Name of the list of all cylinders and blends in the scratch folder."""
@@ -112,6 +112,24 @@ class Labels:
                 scratch.append(f"{name}-of-{tile}", values)
             # mapped: a search in it touches few of its pages
             self._rows.append(scratch.mapped(f"row-of-{tile}", np.int64))
+
+    @property
+    def points(self) -> int:
+        """Number of points that were used."""
+        return sum(self._scratch.size(rows_name(tile), np.int64) for tile in range(len(self._rows)))
+
+    def tiles(self) -> Iterator[tuple[FloatArray, IndexArray, NDArray[np.int32], NDArray[np.float32]]]:
+        """Yield points, row numbers, labels and residuals of each tile; without a label the residual is NaN."""
+        for tile, labelled in enumerate(self._rows):
+            rows = self._scratch.rows(rows_name(tile), np.int64)
+            points = self._scratch.rows(points_name(tile), np.float64, 3)
+            ids, residuals = np.full(len(rows), -1, np.int32), np.full(len(rows), np.nan, np.float32)
+            count = len(labelled)
+            own = self._ids[self._scratch.part(f"id-of-{tile}", np.int32, 0, count)]
+            distances = self._scratch.part(f"residual-of-{tile}", np.float32, 0, count)
+            places = np.searchsorted(rows, labelled)  # as they were read, so ascending
+            ids[places], residuals[places] = own, np.where(own >= 0, distances, np.float32(np.nan))
+            yield points, rows, ids, residuals
 
     def pieces(self, start: int, count: int, size: int) -> Iterator[tuple[NDArray[np.int32], NDArray[np.float32]]]:
         """Yield label and residual of the rows from one on, in pieces of a size."""

@@ -21,14 +21,15 @@ from cylx.tiles.gather import gather_tile
 from cylx.tiles.grouping import tell_tiles, write_groups
 from cylx.tiles.join import join_group
 from cylx.tiles.label import Labels, label_tile
+from cylx.tiles.rejected import rejected_in
 from cylx.tiles.results import in_order, joining_report, scene_of, stages_of, warnings_of, write_finals
 from cylx.tiles.schedule import Runner
 from cylx.tiles.search import WHOLE, Plan, found_in, points_name, search_tile
 from cylx.tiles.tree import usual_side
 
-BASE, A_POINT = 300_000_000, 220
-"""Estimate of the peak memory of the search of a tile, and per point of it and its margin, bytes: a whole cloud of
-three million points takes less, 855 MB in all."""
+BASE, A_POINT = 300_000_000, 250
+"""Estimate of the peak memory of the search of a tile, and per point of it and its margin, bytes: two million points in
+tiles of a plant took 830 MB."""
 OVERHEAD = 1.6
 """Points of a tile with its margin over those without, at the most, usually."""
 LEAST_POINTS, MOST_POINTS = 20_000, 8_000_000
@@ -55,12 +56,15 @@ class Options:
         For each process that searches tiles, bytes.
     threads : int
         Of each process.
+    rejected : bool
+        Whether what is not accepted is given, too.
     """
 
     size: float | None
     buffer: float | None
     memory: float
     threads: int
+    rejected: bool = False
 
 
 class Outcome(NamedTuple):
@@ -148,7 +152,7 @@ def extract_in_tiles(
     largest = known.radius_max or max(0.5 * extent, known.radius_min or 0.0)
     large = LARGE * usual_side(tree, seen.sample)
     of_tiles = config.model_copy(update={"scene": known.model_copy(update={"radius_max": largest})})
-    plan = Plan(scratch, of_tiles, tree.boxes, margin, large, options.threads)
+    plan = Plan(scratch, of_tiles, tree.boxes, margin, large, options.threads, options.rejected)
     counts = cut(clouds, selection, scratch, tree, margin, observer)
     tiles = list(range(len(tree)))
     whole = [WHOLE] if len(tree) > 1 and 0.0 < large < largest else []
@@ -180,6 +184,7 @@ def extract_in_tiles(
         tiling,
         tuple(warnings_of(clouds, seen, scene, cylinders)),
         tuple(blends) if config.verification.enabled and config.verification.blends else None,
+        rejected_in(scratch, len(tree)) if options.rejected else (),
     )
     return Outcome(extraction, Labels(scratch, len(tree), ids), seen.colored)
 

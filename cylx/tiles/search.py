@@ -17,6 +17,7 @@ from cylx.pipeline.stage_log import StageLog
 from cylx.records import Finding, IndexedCloud, PointCloud, SilentObserver, Source
 from cylx.scene import Prepared, prepare
 from cylx.tiles.parts import Part, in_scene
+from cylx.tiles.rejected import keep_rejected
 
 SAMPLED = 200
 """Points of a cylinder that tell where it is."""
@@ -46,6 +47,8 @@ class Plan:
         Radius from which a cylinder of the thinned whole counts, scene units.
     threads : int
         Of each process.
+    rejected : bool
+        Whether what is not accepted is kept.
     """
 
     scratch: Scratch
@@ -54,6 +57,7 @@ class Plan:
     margin: float
     large: float
     threads: int
+    rejected: bool = False
 
     def region(self, tile: int) -> FloatArray:
         """Return the box of what is seen in a tile, shape (2, 3)."""
@@ -116,6 +120,8 @@ def search_tile(plan: Plan, tile: int) -> int:
         scale = {"spacing": prepared.scene.spacing, "noise": prepared.scene.noise}
         if tile != WHOLE:
             _keep_frame(scratch, tile, prepared, found, len(inside))
+            if plan.rejected:
+                keep_rejected(scratch, tile, plan.boxes[tile], prepared, found)
     content = {
         "parts": [part.to_object() for part in parts],
         "stages": [[one.name, one.considered, one.kept, dict(one.rejected)] for one in log.reports],

@@ -89,8 +89,9 @@ def grow_tree(
 ) -> Tree:
     """Cut a cloud into tiles.
 
-    A box with too many points is cut at their median, across its longest side. With a size given, boxes are first cut
-    at multiples of it from the corner of the cloud.
+    A box with too many points is cut across its longest side, into shares for half of the tiles that it needs each: at
+    the median if that number is even. With a size given, boxes are first cut at multiples of it from the corner of the
+    cloud.
 
     Parameters
     ----------
@@ -167,9 +168,11 @@ def _cut_of(
     if len(box.points) <= most:
         return None
     widths = _widths(box.points)
+    needed = math.ceil(len(box.points) / most)
+    share = (needed // 2) / needed
     for axis in np.argsort(-widths, kind="stable"):
         values = box.points[:, axis]
-        place = float(np.median(values))
+        place = float(np.quantile(values, share))
         if widths[axis] > narrowest and values.min() < place:
             return int(axis), place
     return None

@@ -1,7 +1,10 @@
 """A plant made in pieces, extracted as a whole and in tiles: what is found, how long it takes, how much memory.
 
 A piece is a rack of 6 x 6 m with fifteen pipes in layers, which lie on I-beams, and a floor; four more pipes run
-through all pieces of a row. The memory is that of all processes together, looked at ten times a second.
+through all pieces of a row. The memory is that of all processes together, looked at up to ten times a second.
+
+With `--kept`, what was measured is written down run by run, and is not measured again: a plant of 100 M points takes
+hours on a machine that has other work. The picture has all that is kept.
 """
 
 import argparse
@@ -16,6 +19,7 @@ from pathlib import Path
 
 import laspy
 import numpy as np
+from pictures import COLORS, PICTURES, can_draw, open_picture, save_picture
 from runs import CYLX, truth_of, warm_up
 from tables import Bars, print_header, print_row
 
@@ -24,6 +28,9 @@ from cylx.evaluation import evaluate
 SIDE, LARGEST, OF_LAYER, HEADERS, SIGMA = 6.0, (0.2, 0.08, 0.15), 5, 4, 0.002
 BEAMS, BEAM = (1.0, 3.0, 5.0), 0.1
 A_PIECE = 1_000_000
+WHOLE = "whole, one thread"
+LOOKS = 50.0
+"""Times that a look at the memory takes until the next one: the kernel walks through all pages."""
 
 
 def layout(rng, corner):
@@ -160,8 +167,9 @@ def watched(command):
     started, before, peak = time.perf_counter(), used(), 0.0
     with subprocess.Popen([str(word) for word in command], stderr=subprocess.DEVNULL) as child:
         while child.poll() is None:
+            began = time.perf_counter()
             peak = max(peak, weight(child.pid))
-            time.sleep(0.1)
+            time.sleep(max(0.1, LOOKS * (time.perf_counter() - began)))
     return child.returncode, time.perf_counter() - started, used() - before, peak
 
 
@@ -171,26 +179,63 @@ def used():
     return usage.ru_utime + usage.ru_stime
 
 
-def measure(scene, folder, extra, bars, most):
-    """Print the row of a run; give its result."""
-    output = Path(folder) / f"{scene.stem}.json"
+def run_of(scene, folder, extra):
+    """Extract a scene; give what was measured as plain data, with the name of the result."""
+    output = Path(folder) / f"{scene.stem}-{'tiled' if extra else 'whole'}.json"
     command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", *extra]
     code, seconds, busy, peak = watched(command)
-    if code:
-        print_row(scene.stem, " ".join(extra) or "whole", *["-"] * 7)
-        return None
-    result, truth = (json.loads(path.read_text(encoding="utf-8")) for path in (output, truth_of(scene)))
-    told, tiles = evaluate(truth, result), result.get("tiles", {"count": 1, "joined": 0})
-    verdict = bars.at_most(peak, most) if extra else ""
-    name = " ".join(extra) or "whole"
-    counts = f"{told.f1:.4f}", f"{tiles['count']}", f"{tiles['joined']}"
-    print_row(scene.stem, name, *counts, f"{seconds:.0f}", f"{busy:.0f}", f"{peak:.0f}", verdict)
+    row = {"code": code, "seconds": seconds, "busy": busy, "peak": peak, "result": str(output)}
+    if code == 0:
+        result, truth = (json.loads(path.read_text(encoding="utf-8")) for path in (output, truth_of(scene)))
+        tiles = result.get("tiles", {"count": 1, "joined": 0})
+        row |= {"points": truth["points"], "f1": evaluate(truth, result).f1, "pipes": len(truth["cylinders"])}
+        row |= {"tiles": tiles["count"], "joined": tiles["joined"]}
+    return row
+
+
+def show(scene, run, row, bars, most):
+    """Print the row of a run."""
+    if row["code"]:
+        print_row(scene.stem, run, *["-"] * 8)
+        return
+    verdict = bars.at_most(row["peak"], most) if run != WHOLE else ""
+    counts = str(row["pipes"]), f"{row['f1']:.4f}", str(row["tiles"]), str(row["joined"])
+    per_point = row["busy"] / row["points"] * 1e6
+    times = f"{row['seconds']:.0f}", f"{row['busy']:.0f}", f"{per_point:.1f}"
+    print_row(scene.stem, run, *counts, *times, f"{row['peak']:.0f}", verdict)
     sys.stdout.flush()
-    return output
+
+
+def slope_of(rows):
+    """Give the slope of processor seconds over points, both logarithmic."""
+    points, seconds = (np.log([row[name] for row in rows]) for name in ("points", "busy"))
+    return float(np.polyfit(points, seconds, 1)[0])
+
+
+def draw(kept, folder):
+    """Draw time and memory of the runs in tiles, and of those in one piece, by the number of points."""
+    figure, (left, right) = open_picture(panels=2)
+    for number, name in enumerate(("in tiles", WHOLE)):
+        rows = [row for key, row in kept.items() if not row["code"] and key.endswith(f" {WHOLE}") == (name == WHOLE)]
+        rows.sort(key=lambda row: row["points"])
+        if not rows:
+            continue
+        points = [row["points"] for row in rows]
+        told = f"{name}, slope {slope_of(rows):.2f}" if len(rows) > 1 else name
+        left.plot(points, [row["busy"] for row in rows], "o-", color=COLORS[number], label=told)
+        right.plot(points, [row["peak"] for row in rows], "o-", color=COLORS[number], label=name)
+    left.set_ylabel("seconds of processors")
+    right.set_ylabel("peak memory of all processes, MB")
+    for axis in (left, right):
+        axis.set_xscale("log")
+        axis.set_yscale("log")
+        axis.set_xlabel("points")
+        axis.legend(frameon=False, fontsize="small")
+    save_picture(figure, folder, "tiles", "seconds of processors and peak memory by the number of points, in tiles")
 
 
 def main():
-    """Print a row a run."""
+    """Print a row a run, the differences that tiles make, and the picture."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument(
         "scenes", metavar="SCENE.laz", nargs="*", type=Path, help="made if missing: plant3.laz has 3 M points"
@@ -198,22 +243,34 @@ def main():
     parser.add_argument("--whole", action="store_true", help="extract each without tiles, too, and compare")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--memory", default="2GB")
+    parser.add_argument("--scratch", type=Path, help="folder for the tiles and the results (default: a temporary one)")
+    parser.add_argument("--kept", type=Path, metavar="FILE.json", help="what was measured before, and is from now on")
+    parser.add_argument("--pictures", type=Path, default=PICTURES, help="where they go (default: docs/pictures)")
     a = parser.parse_args()
-    for scene in a.scenes:
-        if not (scene.is_file() and truth_of(scene).is_file()):
-            make(scene, int("".join(filter(str.isdigit, scene.stem))), 0)
+    kept = json.loads(a.kept.read_text(encoding="utf-8")) if a.kept is not None and a.kept.is_file() else {}
     bars, most = Bars(), float(a.memory.removesuffix("GB")) * 1000
-    print_header("scene", "run", "F1", "tiles", "joined", "seconds", "of processors", "peak MB", "bar")
-    with tempfile.TemporaryDirectory() as folder:
+    tiled = f"tiles, {a.memory}, {a.jobs} process{'es' if a.jobs != 1 else ''}"
+    heads = "scene", "run", "pipes", "F1", "tiles", "joined", "seconds", "of processors", "µs a point", "peak MB", "bar"
+    print_header(*heads)
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = a.scratch or Path(temporary)
+        extra = ("--tile", "auto", "--memory", a.memory, "--jobs", str(a.jobs), "--scratch", folder, "--resume")
         warm_up(folder)
         for scene in a.scenes:
-            tiled = ("--tile", "auto", "--memory", a.memory, "--jobs", str(a.jobs), "--scratch", folder)
-            first = measure(scene, folder, tiled, bars, most)
-            if a.whole and first is not None:
-                kept = first.with_name("tiled.json")
-                first.replace(kept)
-                measure(scene, folder, (), bars, most)
-                subprocess.run([*CYLX, "diff", first, kept], check=False)
+            if not (scene.is_file() and truth_of(scene).is_file()):
+                make(scene, int("".join(filter(str.isdigit, scene.stem))), 0)
+            for run in (tiled, *([WHOLE] if a.whole else ())):
+                key = f"{scene.stem} {run}"
+                if key not in kept or kept[key]["code"]:
+                    kept[key] = run_of(scene, folder, extra if run == tiled else ("--threads", "1"))
+                    if a.kept is not None:
+                        a.kept.write_text(json.dumps(kept, indent=1), encoding="utf-8")
+                show(scene, run, kept[key], bars, most)
+            results = [kept[f"{scene.stem} {run}"]["result"] for run in (WHOLE, tiled) if f"{scene.stem} {run}" in kept]
+            if len(results) == 2 and all(Path(one).is_file() for one in results):
+                subprocess.run([*CYLX, "diff", *results], check=False)
+    if can_draw() and kept:
+        draw(kept, a.pictures)
     return bars.exit_code()
 
 

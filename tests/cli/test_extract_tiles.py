@@ -1,6 +1,7 @@
 """`cylx extract --tile`: the same result by one process or several, after a kill, and of one file or many."""
 
 import json
+import re
 import signal
 
 import numpy as np
@@ -86,6 +87,27 @@ def test_a_killed_run_is_gone_on_with_to_the_same_bytes(spawn_cylx, run_cylx, fo
     assert left_in(folder) == []
 
 
+def test_page_picture_and_rejected_are_those_of_the_whole(run_cylx, folder, points):
+    pytest.importorskip("matplotlib")
+    names = ["r.json", "page.html", "picture.png"]
+    wanted = [word for pair in zip(["--rejected", "--report", "--png"], names, strict=True) for word in pair]
+    wanted = [word if word.startswith("--") else folder / word for word in wanted]
+    extract(run_cylx, folder, *wanted)
+    first = contents(folder)
+    assert first["picture.png"].startswith(b"\x89PNG")
+    result = json.loads(first["scan.cylinders.json"])
+    rejected = json.loads(first["r.json"])
+    assert rejected["input"] == result["input"]
+    (blob,) = re.findall(r'<script id="data" type="application/json">(.*?)</script>', first["page.html"].decode(), re.S)
+    page = json.loads(blob)
+    assert page["result"] == {key: value for key, value in result.items() if key != "config"}
+    assert page["rejected_count"] == len(rejected["rejected"])
+    assert (page["view"]["total"], page["view"]["count"]) == (len(points), len(points))
+    assert len(page["maps"]) == len(result["cylinders"]) == 1
+    extract(run_cylx, folder, *wanted, "--jobs", "2")
+    assert contents(folder) == first
+
+
 def test_several_files_are_one_cloud(run_cylx, tmp_path, points):
     pytest.importorskip("laspy")
     import laspy
@@ -127,7 +149,7 @@ def test_a_scan_that_does_not_fit_is_cut_and_told_of(run_cylx, folder, monkeypat
     [
         (["--tile", "0"], "'0' is neither a length nor auto"),
         (["--tile", "auto", "--memory", "much"], "'much' is no memory such as 4GB"),
-        (["--tile", "2", "--rejected", "r.json"], "--rejected: does not work with tiles; leave it out"),
+        (["--tile", "2", "--runs"], "--runs: does not work with tiles; leave it out"),
         (["--tile", "2", "--voxel", "0.1"], "--voxel: does not work with tiles; leave it out"),
         (["--tile", "2", "--annotated", "a.pcd"], "--annotated a.pcd: does not work with tiles; choose a name in .ply"),
         (["--tile", "2", "--method", "msac"], "method: msac does not work in tiles; use gt"),

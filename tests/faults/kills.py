@@ -27,12 +27,13 @@ ROOT = Path(__file__).resolve().parents[2]
 SIGNALS = ("SIGKILL", "SIGTERM", "SIGHUP", "SIGINT")
 WORKER = "a worker"
 """Kill a process that works for the run instead of the run."""
+SINGLE = ["scans/0.ply", "-o", "{out}/", "--report", "{out}/", "--rejected", "{out}/"]
 BATCH = ["scans", "--out-dir", "{out}"]
 WAYS = {
-    "single": ["scans/0.ply", "-o", "{out}/", "--report", "{out}/", "--rejected", "{out}/"],
+    "single": SINGLE,
     "batch": BATCH,
     "batch --jobs 2": [*BATCH, "--jobs", "2"],
-    "tiles": ["scans/0.ply", "-o", "{out}/", "--tile", "{tile}", "--jobs", "2"],
+    "tiles": [*SINGLE, "--tile", "{tile}", "--jobs", "2"],
 }
 EVERY = 20
 """Kills after which the faults so far are counted."""

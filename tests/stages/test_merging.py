@@ -111,6 +111,19 @@ def test_ends_of_a_long_pipe_are_joined_if_they_point_at_each_other(x, kept):
     assert len(merge_pieces(vague, indexed, accept(indexed))) == kept
 
 
+@pytest.mark.parametrize(
+    ("low", "radius", "error", "kept"),
+    [(10, 1.0, 0.001, 1), (10, 1.04, 0.001, 2), (10, 1.04, 0.02, 1), (5, 1.04, 0.001, 1)],
+    ids=["of one size", "of another", "as far as is known", "near"],
+)
+def test_over_a_gap_longer_than_themselves_only_pieces_of_one_size_are_joined(monkeypatch, low, radius, error, kept):
+    """The noise hides the difference in any case."""
+    monkeypatch.setattr("tests.stages.test_merging.SIGMA", 0.05)
+    indexed, findings, _ = world(pipe(0, 4), pipe(low, low + 4, radius=radius), n=4000)
+    findings = [replace(one, offset_error=error * one.segment.radius) for one in findings]
+    assert len(merge_pieces(findings, indexed, accept(indexed))) == kept
+
+
 def test_the_judge_has_the_last_word():
     indexed, findings, _ = world(pipe(0, 4), pipe(4, 8))
     assert len(merge_pieces(findings, indexed, lambda segment, best: None)) == 2

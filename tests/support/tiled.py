@@ -1,5 +1,7 @@
 """Scenes for tiles, and runs of them: pipes where they are wanted, of points anywhere."""
 
+from contextlib import contextmanager
+
 import numpy as np
 
 from cylx.config import Config
@@ -56,16 +58,22 @@ def truth(*cylinders):
     return {"cylinders": entries}
 
 
-def in_tiles(points, folder, *, size=None, buffer=None, most=None, config=None, runner=None, monkeypatch=None):
-    """Extract a cloud in tiles, of a size or of so many points; give the outcome and the labels of all rows."""
-    if most is not None:
-        monkeypatch.setattr(tiled, "points_for", lambda memory: most)
-    options = tiled.Options(size, buffer, 2e9, 1)
+@contextmanager
+def outcome_of(points, folder, *, size=None, buffer=None, config=None, runner=None, rejected=False):
+    """Extract a cloud in tiles of a size, and yield the outcome, while the scratch folder is there."""
+    options = tiled.Options(size, buffer, 2e9, 1, rejected)
     with open_scratch(folder, "result", {}, resume=False) as scratch:
         clouds = [stream_arrays([points], scratch.path("spool"))]
-        outcome = tiled.extract_in_tiles(
+        yield tiled.extract_in_tiles(
             clouds, Selection(), config or Config(), options, scratch, runner or Here(), SilentObserver()
         )
+
+
+def in_tiles(points, folder, *, most=None, monkeypatch=None, **how):
+    """Extract a cloud in tiles, of a size or of so many points; give the extraction and the labels of all rows."""
+    if most is not None:
+        monkeypatch.setattr(tiled, "points_for", lambda memory: most)
+    with outcome_of(points, folder, **how) as outcome:
         pieces = list(outcome.labels.pieces(0, len(points), 1 << 16))
     labels, residuals = (np.concatenate(one) for one in zip(*pieces, strict=True))
     return outcome.extraction, labels, residuals

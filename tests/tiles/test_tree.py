@@ -66,3 +66,10 @@ def test_what_cannot_be_cut_is_one_tile():
 def test_tiles_are_not_narrower_than_a_few_margins(points):
     tree = grow_tree(points[:3000], 10, size=None, corner=np.zeros(3), margin=0.1)
     assert 1 <= len(tree) <= 12
+
+
+def test_there_are_no_more_tiles_than_the_points_need():
+    points = np.random.default_rng(3).uniform(0, [10, 10, 1], size=(7100, 3))
+    tree = grow_tree(points, 1000, size=None, corner=np.zeros(3))
+    assert len(tree) == 8
+    assert max(len(inside) for _, inside, _ in tree.spread(points, 0.0)) <= 1000

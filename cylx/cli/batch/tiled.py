@@ -73,9 +73,6 @@ def check_tiles(jobs: Sequence[Job], settings: Config, selection: Selection, *, 
 
     remedy = "leave it out, or leave --tile out"
     wanted = {
-        "--rejected": any(job.rejected for job in jobs),
-        "--report": any(job.report for job in jobs),
-        "--png": any(job.picture for job in jobs),
         "--voxel": selection.voxel is not None,
         "--runs": runs,
     }
@@ -149,7 +146,8 @@ def extract_tiled(run: TiledRun, jobs: Sequence[Job]) -> Finished:
     with ExitStack() as stack:
         observer = Observers(Listener(), stack.enter_context(run.messages.progress()), stopwatch)
         compile_kernels(observer)
-        options = options_of(run.tiles, run.processes, run.threads)
+        wanted = job.rejected is not None or job.report is not None
+        options = options_of(run.tiles, run.processes, run.threads, rejected=wanted)
         runner = stack.enter_context(runner_of(run.tiles, run.processes, options.memory))
         scratch = stack.enter_context(_scratch_of(run, jobs, options))
         clouds = [_streamed(one, scratch.path(f"spool-{i}"), run) for i, one in enumerate(jobs)]
@@ -166,7 +164,7 @@ def extract_tiled(run: TiledRun, jobs: Sequence[Job]) -> Finished:
     return Finished(rows, found, extraction.warnings, stopwatch.report(rows, found), blends)
 
 
-def options_of(tiles: TileOptions, processes: int | None, threads: int | None) -> Options:
+def options_of(tiles: TileOptions, processes: int | None, threads: int | None, *, rejected: bool = False) -> Options:
     """Return how to cut: the size of the tiles must not depend on what is free, nor on the number of processes.
 
     Raises
@@ -184,7 +182,7 @@ def options_of(tiles: TileOptions, processes: int | None, threads: int | None) -
     if tiles.memory is not None:
         each = float(tiles.memory) if tiles.scheduler is not None else min(each, share * tiles.memory)
     size = None if tiles.size in (None, AUTO) else tiles.size
-    return Options(size, tiles.buffer, each, threads or max(1, cores() // (processes or 1)))
+    return Options(size, tiles.buffer, each, threads or max(1, cores() // (processes or 1)), rejected)
 
 
 def _streamed(job: Job, spool: Path, run: TiledRun) -> StreamedCloud:
@@ -214,17 +212,19 @@ def _scratch_of(run: TiledRun, jobs: Sequence[Job], options: Options) -> Abstrac
         "inputs": [sha256_of(job.scan) if job.scan != STREAM else STREAM for job in jobs],
         "selection": {key: value if key != "crop" else value.model_dump() for key, value in keys.items()},
         "config": run.settings.model_dump(mode="json"),
-        "options": [options.size, options.buffer, options.memory],
+        "options": [options.size, options.buffer, options.memory, options.rejected],
     }
     return open_scratch(parent, str(result), manifest, resume=run.resume)
 
 
 def _write(jobs: Sequence[Job], clouds: Sequence[StreamedCloud], outcome: Outcome, *, overwrite: bool) -> list[str]:
-    """Write the JSON, the annotated clouds and the mesh, all or nothing."""
+    """Write the JSON, the annotated clouds and all other outputs, all or nothing."""
     from cylx.io import write_annotated_stream, write_bytes, write_text
     from cylx.io.outputs import all_or_none
     from cylx.io.streamed_cloud import ROWS
-    from cylx.results import Result
+    from cylx.report import html_of, png_of
+    from cylx.results import Rejections, Result
+    from cylx.tiles.sample import sampled
 
     extraction, labels, job = outcome.extraction, outcome.labels, jobs[0]
     content = Result.of(extraction)
@@ -238,6 +238,15 @@ def _write(jobs: Sequence[Job], clouds: Sequence[StreamedCloud], outcome: Outcom
             start += cloud.rows
         if job.mesh is not None and mesh is not None:
             write_bytes(staged(job.mesh), mesh, overwrite=overwrite)
+        if job.rejected is not None:
+            write_text(staged(job.rejected), Rejections.of(extraction).to_json(), overwrite=overwrite)
+        if job.report is not None or job.picture is not None:
+            some = sampled(extraction, labels)
+            if job.report is not None:
+                page = html_of(some, result=content, points=labels.points)
+                write_text(staged(job.report), page, overwrite=overwrite)
+            if job.picture is not None:
+                write_bytes(staged(job.picture), png_of(some), overwrite=overwrite)
         write_text(result, content.to_json(), overwrite=overwrite)
     if job.mesh is not None and mesh is None:  # an old mesh does not belong to this result
         Path(job.mesh).unlink(missing_ok=True)
