@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from cylx.evidence.measures import Shell
-from cylx.geometry.arrays import IndexArray, MaskArray
+from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.coverage import SECTORS, filled_sectors, sector_of
 
 PIECES_OF_HEIGHT = 10
@@ -25,6 +25,8 @@ LEAST_ON = 10
 """Points on the surface without which there is no density to compare with."""
 WALL, WALL_SHARE, WALL_SECTORS = 0.04, 0.5, 9
 """The inner wall of a tube is so thick at most, in radii, holds this share of what is inside, over so many sectors."""
+BALL_DEVIATIONS, BALL_RADII, BALL_HEIGHT = 3.0, 0.03, 0.8
+"""Points within so many deviations, or radii, of a ball are on it; it is followed up to this height, in radii."""
 ARC_SHARE = 0.3
 """Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
 
@@ -208,3 +210,39 @@ def _longest_run(filled: MaskArray) -> tuple[int, int]:
         if length > best[1]:
             best = (int(start), length)
     return best
+
+
+def ball_share(points: FloatArray, model: FloatArray, half: float, deviation: float) -> float:
+    """Return how much of a ball goes on above or below a band of it, as a share of what there would be.
+
+    Equal heights of a ball and of the cylinder about it have equal areas.
+
+    Parameters
+    ----------
+    points : ndarray of shape (n, 3)
+        About the band, frame units.
+    model : ndarray of shape (7,)
+        The cylinder whose middle is that of the ball.
+    half : float
+        Half the height of the band.
+    deviation : float
+        Standard deviation of the points on it.
+
+    Returns
+    -------
+    float
+        Of the fuller side, in [0, 1].
+    """
+    away = points - model[:3]
+    heights = away @ model[3:6]
+    radius = float(model[6])
+    reach = max(BALL_DEVIATIONS * deviation, BALL_RADII * radius)
+    near = np.abs(np.sqrt((away**2).sum(axis=1)) - radius) < reach
+    low, high = half + reach, min(BALL_HEIGHT * radius, 3.0 * half + reach)
+    if high <= low:
+        return 0.0
+    across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
+    on = (np.abs(across - radius) < 3.0 * deviation) & (np.abs(heights) < half)
+    expected = float(on.sum()) * (high - low) / (2.0 * half)
+    counts = [float((near & (side * heights > low) & (side * heights < high)).sum()) for side in (-1.0, 1.0)]
+    return min(1.0, max(counts) / max(expected, 1.0))

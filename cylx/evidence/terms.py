@@ -67,11 +67,14 @@ def misfit(measures: Mapping[str, float]) -> float:
 
 
 def explained(measures: Mapping[str, float]) -> float:
-    """Return the share of the deviation of form that another shape explains, beyond what chance brings."""
+    """Return the share of the deviation of form that another shape explains, beyond what chance brings.
+
+    Of what stands on a plane it is also asked whether it is the band of a ball.
+    """
     share = measures["explained"]
     if measures["facets"] > 0.5 or measures["prism"] > PRISM:
         share = max(share, measures["prism"])
-    return max(0.0, share - 0.3) * min(1.0, measures["structure_radii"] / 0.01)
+    return max(max(0.0, share - 0.3) * min(1.0, measures["structure_radii"] / 0.01), measures.get("ball", 0.0))
 
 
 def facets(measures: Mapping[str, float]) -> float:

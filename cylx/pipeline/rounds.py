@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -208,7 +209,7 @@ class Rounds:
             for finding in self.findings:
                 free[finding.points] = False
             start = len(self.findings)
-            walls = self._over_threads(lambda one, free=free: walls_about(one, self._indexed, free), fresh)
+            walls = self._over_threads(partial(walls_about, indexed=self._indexed, free=free), fresh)
             fitted = [(wall, one) for one, found in zip(fresh, walls, strict=True) for wall in found]
             self.verify(self._over_threads(lambda pair: self._fit_wall(*pair), fitted), log)
             fresh = [finding for finding in self.findings[start:] if not finding.blend]

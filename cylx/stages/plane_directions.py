@@ -135,8 +135,8 @@ def _fill_refined(local: FloatArray, k: int, width: float, tolerance: float, nor
     matrix, vectors, sums = np.empty((3, 3)), np.empty((3, 3)), np.empty(4)
     offset, narrow, beside = 0.0, 0.0, 0
     for _ in range(3):
-        matrix[:] = 0.0
-        sums[:] = 0.0
+        matrix.fill(0.0)
+        sums.fill(0.0)
         beside = 0
         for a in range(k):
             height = local[a, 0] * normal[0] + local[a, 1] * normal[1] + local[a, 2] * normal[2]

@@ -24,7 +24,7 @@ from cylx.evidence.measures import (
 )
 from cylx.evidence.places import distinct_places
 from cylx.evidence.prisms import prism_share
-from cylx.evidence.surroundings import clear_of_ends, continuation, emptiness, flank
+from cylx.evidence.surroundings import ball_share, clear_of_ends, continuation, emptiness, flank
 from cylx.evidence.weights import weigh, weigh_blend, weigh_profile, weigh_upright
 from cylx.geometry.arrays import IndexArray
 from cylx.geometry.coverage import covered_angle
@@ -175,6 +175,10 @@ def _measures_of(
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
     }
+    if segment.upright:
+        about = indexed.cells.near_cylinder(segment.model, -radius, radius, 0.0, 1.1 * radius)
+        points = indexed.points[about[:: 1 + len(about) // ENOUGH_TO_MEASURE]]
+        measures["ball"] = ball_share(points, segment.model, segment.half, deviation)
     return measures, (shape["offset_error"], shape["tilt_error"])
 
 
