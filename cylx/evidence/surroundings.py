@@ -10,6 +10,7 @@ import numpy as np
 from cylx.evidence.measures import Shell
 from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.coverage import SECTORS, filled_sectors, sector_of
+from cylx.geometry.cylinder import axis_basis
 
 PIECES_OF_HEIGHT = 10
 """Pieces of the height over which inside and outside are counted; their median forgives lids, floors and crossings."""
@@ -25,8 +26,9 @@ LEAST_ON = 10
 """Points on the surface without which there is no density to compare with."""
 WALL, WALL_SHARE, WALL_SECTORS = 0.04, 0.5, 9
 """The inner wall of a tube is so thick at most, in radii, holds this share of what is inside, over so many sectors."""
-BALL_DEVIATIONS, BALL_RADII, BALL_HEIGHT = 3.0, 0.03, 0.8
-"""Points within so many deviations, or radii, of a ball are on it; it is followed up to this height, in radii."""
+BALL_DEVIATIONS, BALL_RADII, BALL_HEIGHT, BALL_SECTORS = 3.0, 0.03, 0.8, 0.5
+"""Points within so many deviations, or radii, of a ball are on it; it is followed up to this height, in radii,
+over this share of the sectors."""
 ARC_SHARE = 0.3
 """Sectors with less than this share of what a typical one holds are beyond the end of an arc."""
 
@@ -237,12 +239,25 @@ def ball_share(points: FloatArray, model: FloatArray, half: float, deviation: fl
     heights = away @ model[3:6]
     radius = float(model[6])
     reach = max(BALL_DEVIATIONS * deviation, BALL_RADII * radius)
-    near = np.abs(np.sqrt((away**2).sum(axis=1)) - radius) < reach
     low, high = half + reach, min(BALL_HEIGHT * radius, 3.0 * half + reach)
     if high <= low:
         return 0.0
-    across = np.sqrt(np.maximum((away**2).sum(axis=1) - heights**2, 0.0))
+    u, v = (away @ axis for axis in axis_basis(model[3:6]))
+    across = np.hypot(u, v)
+    sector = sector_of(np.arctan2(v, u))
     on = (np.abs(across - radius) < 3.0 * deviation) & (np.abs(heights) < half)
+    seen = np.bincount(sector[on], minlength=SECTORS) > 0
     expected = float(on.sum()) * (high - low) / (2.0 * half)
-    counts = [float((near & (side * heights > low) & (side * heights < high)).sum()) for side in (-1.0, 1.0)]
-    return min(1.0, max(counts) / max(expected, 1.0))
+    off = np.abs(np.sqrt((away**2).sum(axis=1)) - radius)
+    best = 0.0
+    for side in (-1.0, 1.0):
+        beyond = (side * heights > low) & (side * heights < high)
+        near, beside = (
+            np.bincount(sector[beyond & mask], minlength=SECTORS)
+            for mask in (off < reach, (off >= reach) & (off < 3.0 * reach))
+        )
+        # other surfaces cross the ball or fill its place; they are beside it as well, on twice the depth
+        more = near > beside / 2.0
+        if np.count_nonzero(more & seen) >= BALL_SECTORS * np.count_nonzero(seen):
+            best = max(best, float((near - beside / 2.0).sum()) / max(expected, 1.0))
+    return min(1.0, best)

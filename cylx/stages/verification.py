@@ -174,12 +174,17 @@ def _measures_of(
         "height_radii": 2.0 * segment.half / radius,
         "windows": float(near),
         "agreement": (consistent + 1.0) / (near + 2.0),
+        "ball": _ball(indexed, segment, deviation) if segment.upright else 0.0,
     }
-    if segment.upright:
-        about = indexed.cells.near_cylinder(segment.model, -radius, radius, 0.0, 1.1 * radius)
-        points = indexed.points[about[:: 1 + len(about) // ENOUGH_TO_MEASURE]]
-        measures["ball"] = ball_share(points, segment.model, segment.half, deviation)
     return measures, (shape["offset_error"], shape["tilt_error"])
+
+
+def _ball(indexed: IndexedCloud, segment: Segment, deviation: float) -> float:
+    """Return how much of a ball goes on beside a segment."""
+    radius = segment.radius
+    about = indexed.cells.near_cylinder(segment.model, -radius, radius, 0.0, 1.1 * radius)
+    points = indexed.points[about[:: 1 + len(about) // ENOUGH_TO_MEASURE]]
+    return ball_share(points, segment.model, segment.half, deviation)
 
 
 def _prism(shell: Shell, form: dict[str, float], radius: float, scatter: float, coverage: float) -> float:

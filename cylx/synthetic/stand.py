@@ -65,7 +65,7 @@ def forest(
     --------
     >>> plot = forest(3, side=8.0, spacing=0.02)
     >>> len(plot.stems)
-    4
+    5
     """
     params = {
         "side": side, "stems_per_hectare": stems_per_hectare, "scanner": scanner, "stations": stations, "slope": slope,

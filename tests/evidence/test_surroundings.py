@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cylx.evidence.measures import Shell
-from cylx.evidence.surroundings import emptiness
+from cylx.evidence.surroundings import ball_share, emptiness
 
 RADIUS = 1.0
 laws = settings(max_examples=25, deadline=None)
@@ -140,3 +140,34 @@ def test_what_lies_about_on_most_sides_counts():
     rng = np.random.default_rng(0)
     inside, _ = measured(wall(rng, 1.0, 3000), spokes(rng, 40, 1.0), half=1.0)
     assert inside > 0.5
+
+
+def balls_share(parts, half, deviation=0.004):
+    """Give how much of a ball goes on beside a band about the z axis."""
+    heights, distances, angles = (np.concatenate(column) for column in zip(*parts, strict=True))
+    points = np.column_stack([distances * np.cos(angles), distances * np.sin(angles), heights])
+    model = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0, RADIUS])
+    return ball_share(points, model, half, deviation)
+
+
+@laws
+@given(seeds, st.floats(0.1, 0.3))
+def test_a_ball_goes_on_above_or_below_its_band(seed, half):
+    rng = np.random.default_rng(seed)
+    heights = RADIUS * rng.uniform(-0.3, 1.0, 6000)  # equal heights of a ball have equal areas
+    distances = np.sqrt(RADIUS**2 - heights**2)
+    ball = heights, distances + 0.004 * rng.standard_normal(6000), rng.uniform(-np.pi, np.pi, 6000)
+    assert balls_share([ball], half) > 0.7
+
+
+@laws
+@given(seeds, st.floats(0.1, 0.3), st.floats(0.3, 0.9))
+def test_neither_walls_about_the_same_axis_nor_plates_are_a_ball(seed, half, smaller):
+    rng = np.random.default_rng(seed)
+    short = wall(rng, half, 2000)
+    longer = wall(rng, RADIUS, int(2000 * smaller / half), smaller)
+    assert balls_share([short, cap(rng, half, smaller, RADIUS, 1000), longer], half) < 0.3
+    assert balls_share([short, cap(rng, half, 0.0, 3.0, 9000)], half) < 0.1
+    box = rng.uniform(-RADIUS, RADIUS, (3, 9000))
+    filled = box[2], np.hypot(box[0], box[1]), np.arctan2(box[1], box[0])
+    assert balls_share([short, filled], half) < 0.3

@@ -12,7 +12,7 @@ EDGE = dict(  # noqa: C408  keys without quotes read better
     structure_radii=0.0, ovality=0.0, explained=0.0, facets=0.0, prism=0.0, deviation_radii=1 / 9, inside=0.0,
     outside=0.0, tangent=0.0, tangent_both=0.0, flank=0.3, coverage=3.0, inliers=90.0, places=12.0, curvature=90.0,
     radius_noises=9.0, height_radii=9.0, windows=20.0, payoff=0.8, agreement=0.8, slope=0.0, slope_error=0.01,
-    bulge=0.0, bulge_error=0.01, bend=0.0, bend_error=0.01,
+    bulge=0.0, bulge_error=0.01, bend=0.0, bend_error=0.01, ball=0.0,
 )  # fmt: skip
 """What is thin, seen from one side, and has a flank."""
 

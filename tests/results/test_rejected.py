@@ -95,7 +95,7 @@ def test_the_same_is_refused_on_any_number_of_threads_and_in_any_unit(room, foun
     other = run(1000.0 * room.points).rejected
     # what nothing speaks for may turn on the last digit
     one_by_one = [
-        [one for one in rejected if (one.fit.confidence or 0.0) >= 0.05] for rejected in (found.rejected, other)
+        [one for one in rejected if (one.fit.confidence or 0.0) >= 0.1] for rejected in (found.rejected, other)
     ]
     assert [one.reason for one in one_by_one[1]] == [one.reason for one in one_by_one[0]]
     for one, two in zip(*one_by_one, strict=True):
