@@ -74,7 +74,7 @@ def explained(measures: Mapping[str, float]) -> float:
     share = measures["explained"]
     if measures["facets"] > 0.5 or measures["prism"] > PRISM:
         share = max(share, measures["prism"])
-    return max(max(0.0, share - 0.3) * min(1.0, measures["structure_radii"] / 0.01), measures["ball"])
+    return max(max(0.0, share - 0.3) * min(1.0, measures["structure_radii"] / 0.01), measures.get("ball", 0.0))
 
 
 def facets(measures: Mapping[str, float]) -> float:
