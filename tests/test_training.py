@@ -558,7 +558,7 @@ def test_rows_of_a_part(program, tmp_path, monkeypatch):
     a_part(tmp_path)
     output = tmp_path / "rows.jsonl"
     command = [f"{program.__name__}.py", str(output), "--data", str(tmp_path), "--noise", "0.1"]
-    monkeypatch.setattr(sys, "argv", command + (["--sources", "fit4cad"] if program is real else []))
+    monkeypatch.setattr(sys, "argv", command + (["--sources", "fit4cad"] if program is real else ["--boxes"]))
     assert program.main() == 0
     lines = [json.loads(line) for line in output.read_text(encoding="utf-8").splitlines()]
     assert {line["scene"] for line in lines} <= {"fit4cad_PC1@0.1"}
@@ -567,6 +567,15 @@ def test_rows_of_a_part(program, tmp_path, monkeypatch):
     terms = evidence_weights.BLEND_TERMS if program is arcs else evidence_weights.TERMS
     assert all((fit.law_of(line) != "BIAS") == (program is arcs) for line in lines)
     assert fit.table_of(lines, terms).terms.shape[1] == len(terms)
+
+
+def test_boxes_have_sharp_edges_and_nothing_round():
+    scans = list(arcs.boxes(3))
+    assert len({scan.name for scan in scans}) == len(scans) == len(arcs.BOXES) * len(arcs.NOISES_OF_BOXES)
+    assert {fit.kind_of(scan.name) for scan in scans} == {"box"}
+    assert {scan.judge(None) for scan in scans} == {(labels.FALSE, None)}
+    points = scans[0].cloud.points - scans[0].cloud.points.mean(axis=0)
+    assert np.linalg.norm(points, axis=1).max() == pytest.approx(0.5 * np.linalg.norm(arcs.BOXES[0]), rel=0.05)
 
 
 def test_arcs_are_noted_for_a_while_only():

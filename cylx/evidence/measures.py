@@ -89,9 +89,10 @@ def look_at(segment: Segment, indexed: IndexedCloud) -> Shell:
         model, -half, half, 0.0, model[RADIUS] + max(0.5 * model[RADIUS], 10.0 * deviation)
     )
     heights, residuals, angles = coordinates_of(indexed.points, near, model)
-    flat = ~indexed.may_be_on(near, model, segment.flat_share)
-    if segment.wedge is not None:
-        flat |= _beyond_wedge(indexed.points[near], segment)
+    if segment.wedge is None:
+        flat = ~indexed.may_be_on(near, model, segment.flat_share)
+    else:  # fitted with the planes that touch it, which flat windows on a small arc are taken for
+        flat = _beyond_wedge(indexed.points[near], segment)
     on = (np.abs(residuals) < 3.0 * deviation) & ~flat
     return Shell(near, heights / max(half, 1e-300), residuals, angles, on, flat, deviation)
 

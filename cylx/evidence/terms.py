@@ -61,6 +61,11 @@ def thickness(measures: Mapping[str, float]) -> float:
     return math.sqrt(max(measures["roughness"] ** 2 - excused**2, 1.0))
 
 
+def size(measures: Mapping[str, float]) -> float:
+    """Return the logarithm of the radius over the scatter of its points, twenty being zero; that of forty at most."""
+    return log(1.0 / (20.0 * max(measures["scatter_radii"], LEAST_SCATTER)), 0.2, 2.0)
+
+
 def misfit(measures: Mapping[str, float]) -> float:
     """Return the lack of fit, up to three, the less the more points there are: many show the form of any object."""
     return log(measures["lack_of_fit"], 1.0, 3.0) * min(1.0, TELLING / max(measures["inliers"], 1.0))

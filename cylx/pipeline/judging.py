@@ -12,7 +12,7 @@ from cylx.records import Finding, IndexedCloud, RejectedSegment, Segment
 from cylx.scene import Prepared, out_of_range
 from cylx.segments.finishing import finish, inflation
 from cylx.segments.refitting import refit
-from cylx.stages.arcs import arcs_of
+from cylx.stages.arcs import arcs_of, rounded_edges_of
 from cylx.stages.averaging import ENOUGH_TO_JUDGE
 from cylx.stages.level_part import level_part_of
 from cylx.stages.upright import HELD, leans, upright_of
@@ -25,6 +25,8 @@ UNEVEN, MOST_UNEVEN = 0.02, 0.1
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
 MOST_ARC = math.radians(270.0)
 """Angle of the surface from which a refused segment is no arc between two planes."""
+FLAT_SIDES = 0.3
+"""Share of a flank from which what was found may be two rounded edges of a bar or a plate."""
 MOST_LOOSENED, LEAST_KEPT = 1.05, 0.85
 """A short cylinder is upright if its points scatter no more by this factor when it is held so, or do not say that it
 leans; and if it keeps this share of them."""
@@ -65,6 +67,10 @@ class Judge:
         It is halved until its pieces pass, so that they are as long as may be.
         """
         whole = self.judge(segment, support, payoff)
+        if whole.measures and whole.measures["flank"] > FLAT_SIDES and not whole.segment.upright:
+            edges = self._judge_edges(whole)
+            if edges:
+                return edges
         if not _may_have_pieces(whole):
             return [whole]
         pieces: list[Finding | RejectedSegment] = []
@@ -117,6 +123,12 @@ class Judge:
             return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
         return _finding(segment, verdict, support, payoff)
 
+    def arc_between_planes(self, rejected: RejectedSegment) -> Finding | None:
+        """Verify an arc with the planes that it goes on into, where no cylinder could be fitted; None if it is none."""
+        if not (self._limits.enabled and self._limits.blends):
+            return None
+        return self._judge_arc(rejected.segment, rejected.support, rejected.payoff, goes_on=False)
+
     def join(self, segment: Segment, best: Finding) -> Finding | None:
         """Refit and judge a joined segment in the light of the better of its parts; None if it is no cylinder."""
         found = self._judge_joined(segment, best)
@@ -124,6 +136,8 @@ class Judge:
 
     def join_blend(self, segment: Segment, best: Finding) -> Finding | None:
         """Refit and judge a joined blend in the light of the better of its parts; None if it is none."""
+        if best.segment.wedge is not None:  # it was fitted with the planes that touch it, and so is the whole
+            return self._judge_arc(segment, best.support, best.payoff, goes_on=False)
         found = self._judge_joined(segment, best)
         return found if found is not None and found.blend else None
 
@@ -154,6 +168,20 @@ class Judge:
             if not verdict.reason and may_be_arc(verdict):
                 return _finding(arc, verdict, support, payoff)
         return None
+
+    def _judge_edges(self, whole: Finding | RejectedSegment) -> list[Finding | RejectedSegment]:
+        """Verify two rounded edges where they explain the points better than one circle; nothing if they do not."""
+        edges = rounded_edges_of(whole.segment, self._indexed)
+        found: list[Finding | RejectedSegment] = []
+        for edge in edges:
+            agreement = self._windows.agreement(edge)
+            verdict = verify(edge, self._indexed, whole.payoff, agreement, self._limits, arc=True)
+            if not verdict.reason and may_be_arc(verdict) and not self.out_of_range(edge):
+                found.append(_finding(edge, verdict, whole.support, whole.payoff))
+        if edges and not found and isinstance(whole, Finding):
+            what = whole.segment, "other shape", whole.support, whole.payoff
+            found.append(RejectedSegment(*what, whole.confidence, whole.coverage, whole.measures))
+        return found
 
     def _judge_upright(self, segment: Segment, support: int, payoff: float) -> Finding | None:
         """Verify a short segment as one that stands on a plane; None if it is none."""

@@ -9,7 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from cylx.fits.profile import fit_profile, tilt_of
-from cylx.geometry.arrays import FloatArray
+from cylx.fits.rounded_end import fit_rounded_end
+from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
 from cylx.geometry.numerics import fill_basis
 from cylx.records import IndexedCloud, Segment
@@ -30,6 +31,9 @@ LEANS = 2
 """The profile is fitted so many times, and the axis after each."""
 MOST_CHI_SQUARE = 3.0
 """Mean square, in squared deviations and clipped at nine, of the residuals of its points."""
+LEAST_END_GAIN, LEAST_END_SHARE, LEAST_FLAT = 40.0, 0.5, 0.04
+"""Two edges are no half round if their squared residuals are smaller by so many squared deviations, by this share of
+what the half round leaves unexplained, and what is flat between them is this much of their radius."""
 
 
 def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], Segment | str] | None) -> list[Segment]:
@@ -66,29 +70,19 @@ def arcs_of(segment: Segment, indexed: IndexedCloud, refit: Callable[[Segment], 
 
 def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
     """Fit an arc and the planes that touch it as one; None if these are not there."""
-    half, radius = segment.half, segment.radius
-    deviation = indexed.noise_about(segment.model, half)
-    if deviation < LEAST_DEVIATION * radius:
+    deviation = indexed.noise_about(segment.model, segment.half)
+    if deviation < LEAST_DEVIATION * segment.radius:
         return None
-    within = half - min(ENDS * deviation, 0.25 * half)  # without what closes the ends
-    near = indexed.cells.near_cylinder(segment.model, -within, within, 0.0, REACH * radius)
-    near = near[:: 1 + len(near) // ENOUGH_OF_PROFILE]
+    near = _about(segment, indexed, deviation)
     if len(near) == 0:
         return None
     model, profile, wedge = segment.model, None, None
     basis = np.empty((2, 3))
     for _ in range(LEANS):
         fill_basis(model[DIRECTION], basis)
-        heights, residuals, angles = coordinates_of(indexed.points, near, model)
-        distances = residuals + model[RADIUS]
-        flat = np.column_stack([distances * np.cos(angles), distances * np.sin(angles)])
+        heights, flat, middle = _across(indexed.points, near, model, deviation)
         if wedge is not None:  # the basis may have turned with the axis
             middle = math.atan2(float(wedge[:3] @ basis[1]), float(wedge[:3] @ basis[0]))
-        else:
-            on = np.abs(residuals) < 3.0 * deviation
-            if not on.any():
-                return None
-            middle = math.atan2(float(np.sin(angles[on]).mean()), float(np.cos(angles[on]).mean()))
         profile = fit_profile(flat, float(model[RADIUS]), middle, deviation)
         if profile is None or profile.edge_gain < LEAST_GAIN:
             return None
@@ -102,6 +96,57 @@ def _with_profile(segment: Segment, indexed: IndexedCloud) -> Segment | None:
     if profile is None or profile.chi_square > MOST_CHI_SQUARE:
         return None
     return replace(segment, model=model, spread=deviation, flat_share=1.0, wedge=wedge)
+
+
+def rounded_edges_of(segment: Segment, indexed: IndexedCloud) -> list[Segment]:
+    """Fit two rounded edges of a bar or a plate, with something narrow and flat between them, to what passed for round.
+
+    Parameters
+    ----------
+    segment : Segment
+    indexed : IndexedCloud
+
+    Returns
+    -------
+    list of Segment
+        Both edges; none if one circle explains the points as well.
+    """
+    deviation = max(indexed.noise_about(segment.model, segment.half), LEAST_DEVIATION * segment.radius)
+    near = _about(segment, indexed, deviation)
+    if len(near) == 0:
+        return []
+    _, flat, middle = _across(indexed.points, near, segment.model, deviation)
+    end = fit_rounded_end(flat, segment.radius, middle, deviation)
+    if end is None or end.gain < LEAST_END_GAIN or end.share < LEAST_END_SHARE or end.flat < LEAST_FLAT * end.radius:
+        return []
+    basis = np.empty((2, 3))
+    fill_basis(segment.direction, basis)
+    edges = []
+    for center, turn in zip(end.centers, end.middles, strict=True):
+        model = segment.model.copy()
+        model[POINT] += center @ basis
+        model[RADIUS] = end.radius
+        wedge = _wedge(basis, float(turn), 0.25 * math.pi)
+        edges.append(replace(segment, model=model, spread=deviation, flat_share=1.0, wedge=wedge))
+    return edges
+
+
+def _about(segment: Segment, indexed: IndexedCloud, deviation: float) -> IndexArray:
+    """Return points about a segment that suffice for its profile, without what closes the ends."""
+    within = segment.half - min(ENDS * deviation, 0.25 * segment.half)
+    near = indexed.cells.near_cylinder(segment.model, -within, within, 0.0, REACH * segment.radius)
+    return near[:: 1 + len(near) // ENOUGH_OF_PROFILE]
+
+
+def _across(
+    points: FloatArray, near: IndexArray, model: FloatArray, deviation: float
+) -> tuple[FloatArray, FloatArray, float]:
+    """Return heights, places across the axis and the angle of the middle of what is on the surface."""
+    heights, residuals, angles = coordinates_of(points, near, model)
+    distances = residuals + model[RADIUS]
+    on = np.abs(residuals) < 3.0 * deviation
+    middle = math.atan2(float(np.sin(angles[on]).sum()), float(np.cos(angles[on]).sum()))
+    return heights, np.column_stack([distances * np.cos(angles), distances * np.sin(angles)]), middle
 
 
 def _wedge(basis: FloatArray, middle: float, opening: float) -> FloatArray:

@@ -42,3 +42,22 @@ def test_the_share_of_a_prism_has_no_unit():
     seen, radius = beam(4, 0.08)
     large = Shell(seen.indices, seen.heights, 1e4 * seen.residuals, seen.angles, seen.on, seen.flat, 800.0)
     assert prism_share(large, 1e4 * radius, 800.0) == pytest.approx(prism_share(seen, radius, 0.08))
+
+
+@pytest.mark.parametrize("sides", [4, 5])
+@pytest.mark.parametrize("seed", range(3))
+def test_few_points_on_each_side_do_not_hide_a_beam(sides, seed):
+    # what points scatter about their neighbours holds the form of the sides, too, and is told as more than the noise
+    sigma = 0.35 * (1.0 / np.cos(np.pi / sides) - 1.0)
+    seen, radius = beam(sides, sigma, seed, count=900)
+    assert prism_share(seen, radius, 1.5 * sigma) == 1.0
+
+
+@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rough_cylinder_is_no_beam(name, seed):
+    rng = np.random.default_rng(seed)
+    rough = shell(SHAPES[name])
+    residuals = rough.residuals + 0.1 * RADIUS * rng.standard_normal(len(rough.residuals))
+    seen = Shell(rough.indices, rough.heights, residuals, rough.angles, rough.on, rough.flat, 0.1 * RADIUS)
+    assert prism_share(seen, RADIUS, 0.1 * RADIUS) < 0.4
