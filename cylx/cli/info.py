@@ -14,6 +14,7 @@ from cylx.cli.options.selection import selecting
 from cylx.cli.terminal.failures import answer, tell
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import InputError
+from cylx.harmless import visible
 from cylx.wording import number
 
 if TYPE_CHECKING:
@@ -215,7 +216,7 @@ def as_text(facts: dict[str, Any]) -> str:
             *(number(radius[name], 4) for name in ("min", "max", "found_from"))
         )
     lines["memory"] = f"{facts['extract_memory_bytes'] / 1e9:.2g} GB for cylx extract"
-    return "".join(f"{name:<8} {value}\n" for name, value in lines.items())
+    return "".join(f"{name:<8} {visible(value)}\n" for name, value in lines.items())
 
 
 def _vector(values: list[float]) -> str:

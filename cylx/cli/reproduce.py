@@ -15,6 +15,7 @@ from cylx.cli.options.configuration import complete_files, debug_option, json_op
 from cylx.cli.terminal.failures import answer
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import OutputError, UsageError
+from cylx.io.existing import has_file
 from cylx.version import __version__
 
 if TYPE_CHECKING:
@@ -174,7 +175,7 @@ class Study:
         from cylx.io import check_writable
 
         check_writable(table, overwrite=True)
-        if not table.exists():
+        if not has_file(table):
             return {}
         try:
             trials = parse_trials(table.read_text(encoding="utf-8"), made_by)

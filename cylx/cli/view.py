@@ -11,6 +11,7 @@ from cylx.cli.batch.jobs import ANNOTATED, RESULT
 from cylx.cli.options.configuration import complete_files, debug_option
 from cylx.cli.terminal.group import ExampleCommand
 from cylx.errors import InputError, UsageError
+from cylx.io.existing import has_anything
 from cylx.io.outputs import STREAM
 
 if TYPE_CHECKING:
@@ -71,7 +72,7 @@ def beside(result: str) -> str:
 
     stem = result.removesuffix(RESULT) if result.endswith(RESULT) else str(Path(result).with_suffix(""))
     names = [stem + ANNOTATED + suffix for suffix in (".ply", *LAS_SUFFIXES, ".pcd")]
-    found = next((name for name in names if result != STREAM and Path(name).exists()), None)
+    found = next((name for name in names if result != STREAM and has_anything(name)), None)
     if found is None:
         raise InputError(result, "has no annotated cloud beside it", "name the cloud by --cloud FILE")
     return found

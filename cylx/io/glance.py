@@ -9,6 +9,7 @@ import numpy as np
 
 from cylx.errors import InputError
 from cylx.io.crs import las_source
+from cylx.io.existing import has_file
 from cylx.io.formats import cloud_name, cloud_suffix, recognise
 from cylx.io.las import las_parts_of, las_pieces, libraries_for
 from cylx.io.las_blocks import las_blocks
@@ -68,7 +69,7 @@ def glance_at(path: str | Path) -> Glance | None:
     InputError
         If it cannot be read, or has no finite point in the pieces.
     """
-    if str(path) == "-" or cloud_name(path) != str(path) or not Path(path).is_file():
+    if str(path) == "-" or cloud_name(path) != str(path) or not has_file(path):
         return None
     with opened(path, "") as source:
         kind = recognise(source, cloud_suffix(path))

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, BinaryIO, NoReturn, cast
 
 from cylx.errors import InputError
+from cylx.io.existing import has_folder
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -70,12 +71,15 @@ def open_input(path: str | Path) -> Iterator[Input]:
     Raises
     ------
     InputError
-        If it does not exist, is empty, cannot be read, or is changed meanwhile.
+        If it does not exist, is empty, a device, cannot be read, or is changed meanwhile.
     """
     place = "standard input" if str(path) == "-" else printable(path)
     with _open(path, place) as stream:
         try:
-            if str(path) != "-" and stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+            kind = None if str(path) == "-" else os.fstat(stream.fileno()).st_mode
+            if kind is not None and (stat.S_ISCHR(kind) or stat.S_ISBLK(kind)):  # most of them never end
+                raise InputError(place, "is a device", "give a file or a pipe")
+            if kind is not None and stat.S_ISREG(kind):
                 with _copied(stream, place) as (copy, size, digest):
                     yield Input(place, copy, size, digest, path=Path(path))
                 return
@@ -198,11 +202,11 @@ def _open(path: str | Path, place: str) -> AbstractContextManager[BinaryIO]:
     try:
         return Path(path).open("rb")
     except FileNotFoundError:
-        raise InputError(place, "no such file", _remedy_for_missing(Path(path))) from None
+        _refuse_missing(Path(path), place)
     except IsADirectoryError:
         raise InputError(place, "is a folder", "give the files in it") from None
     except PermissionError:
-        if Path(path).is_dir():
+        if has_folder(path):
             raise InputError(place, "is a folder", "give the files in it") from None
         raise InputError(place, "may not be read", "ask its owner for the permission") from None
     except (OSError, ValueError) as error:
@@ -263,13 +267,16 @@ def _refuse_os_error(place: str, error: OSError | ValueError) -> NoReturn:
     raise InputError(place, f"cannot be read: {_lowered(fault)}", "check the path and the disk") from None
 
 
-def _remedy_for_missing(path: Path) -> str:
-    try:
-        siblings = [entry.name for entry in path.parent.iterdir()]
-    except OSError:
-        return "check the path"
-    close = difflib.get_close_matches(path.name, siblings, n=1)
-    return f"did you mean {str(path.with_name(close[0]))!r}?" if close else "check the path"
+def _refuse_missing(path: Path, place: str) -> NoReturn:
+    """Refuse a path that leads nowhere: a link whose target is gone, or a name that nothing has."""
+    remedy = "check the path"
+    with suppress(OSError):
+        if path.is_symlink():
+            target = excerpt(str(path.readlink()), 200)
+            raise InputError(place, f"is a link to {target}, which is not there", "check where it leads") from None
+        close = difflib.get_close_matches(path.name, [entry.name for entry in path.parent.iterdir()], n=1)
+        remedy = f"did you mean {str(path.with_name(close[0]))!r}?" if close else remedy
+    raise InputError(place, "no such file", remedy) from None
 
 
 def _refuse_constant(name: str) -> NoReturn:

@@ -11,6 +11,7 @@ from plyfile import PlyData, PlyListProperty, PlyParseError
 
 from cylx.errors import InputError
 from cylx.io.clouds import read_cloud
+from cylx.io.existing import has_file
 from cylx.io.inputs import printable
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def read_object(path: str | Path) -> tuple[NDArray[np.float64], NDArray[np.int64
     cloud = read_cloud(path)
     if cloud.source.format != "ply":
         return cloud.points, None
-    if not Path(path).is_file():
+    if not has_file(path):
         raise InputError(printable(path), "is not a file, and a mesh has to be read twice", "save it to a file")
     try:
         with warnings.catch_warnings():

@@ -29,7 +29,7 @@ except ImportError:  # Python without lzma: zipfile refuses such members
 else:
     _OF_LZMA = (LZMAError,)
 
-_NPY, _ZIP = b"\x93NUMPY", b"PK\x03\x04"
+_NPY, _ZIP = b"\x93NUMPY", (b"PK\x03\x04", b"PK\x05\x06")  # the second: of an archive of nothing
 _MOST_COLUMNS = 1000
 _LYING = 9  # an array of three rows and more columns than this is probably transposed
 _ENOUGH = 1 << 20  # longer than any header
@@ -71,7 +71,7 @@ def read_npy(source: Input) -> NDArray[np.void]:
     head = source.head(6)
     if head == _NPY:
         return columns_of(map_npy(source), source.place)
-    if head[:4] == _ZIP:
+    if head.startswith(_ZIP):
         return _read_packed(source)
     raise InputError(source.place, "is neither NPY nor NPZ", "give it its right suffix")
 

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, NoReturn
 
 from cylx.errors import ExistsError, OutputError
+from cylx.io.existing import has_anything, has_file, has_folder
 from cylx.io.inputs import printable
 from cylx.io.staging import Group, is_staged, known_name, staged
 
@@ -236,7 +237,7 @@ def _moved_at_the_end(name: str, group: Group, *, overwrite: bool) -> Iterator[s
 
 def _may_be_replaced(name: str) -> bool:
     """Return whether an output is a file, or is to become one, rather than a stream or a device."""
-    return name != STREAM and (Path(name).is_file() or not Path(name).exists() or _is_plain_link(name))
+    return name != STREAM and (has_file(name) or not has_anything(name) or _is_plain_link(name))
 
 
 def _target(path: str | Path) -> Path:
@@ -259,7 +260,7 @@ def _mode(path: str | Path) -> int | None:
 
     A link counts as a file, whatever it leads to, unless that is a folder.
     """
-    if _is_plain_link(path) and not Path(path).is_dir():
+    if _is_plain_link(path) and not has_folder(path):
         return stat.S_IFREG | 0o600
     try:
         return Path(path).stat().st_mode
@@ -270,9 +271,9 @@ def _mode(path: str | Path) -> int | None:
 
 
 def _check_folder(folder: Path, place: str) -> None:
-    if not folder.exists():
+    if not has_anything(folder):
         raise OutputError(place, f"the folder {str(folder)!r} does not exist", "create it first")
-    if not folder.is_dir():
+    if not has_folder(folder):
         raise OutputError(place, f"{str(folder)!r} is not a folder", "choose another folder")
     if not os.access(folder, os.W_OK | os.X_OK):
         raise OutputError(place, f"the folder {str(folder)!r} is read-only", "choose another folder")

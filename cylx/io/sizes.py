@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from cylx.io.existing import has_file
+
 _HEAD = 1 << 16
 _BOM = b"\xef\xbb\xbf"
 _PROMISES = {
@@ -29,7 +31,7 @@ def expected_points(path: str | Path) -> int:
         0 if there is no such file, or no estimate.
     """
     try:
-        if not Path(path).is_file():  # a pipe can be read only once
+        if not has_file(path):  # a pipe can be read only once
             return 0
         size = Path(path).stat().st_size
         with Path(path).open("rb") as file:

@@ -78,6 +78,15 @@ def test_the_radii_are_those_that_are_looked_for(run_cylx, tmp_path, scene):
     assert radius["found_from"] == 2 * radius["min"]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="such names are refused there")
+def test_a_name_of_several_lines_is_shown_on_one(run_cylx, tmp_path, scene, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_cloud("can.ply", scene.points, properties=None)
+    Path("can.ply").rename("a\nformat   las\t.ply")
+    shown = run_cylx("info", "a\nformat   las\t.ply")
+    assert shown.stdout.splitlines()[:2] == ["file     a\\u000aformat   las\\u0009.ply", "format   ply"]
+
+
 def test_standard_input_will_do(run_cylx, tmp_path, scene):
     write_cloud(tmp_path / "can.ply", scene.points, properties=None)
     shown = run_cylx("info", "-", input=(tmp_path / "can.ply").read_bytes())

@@ -46,6 +46,8 @@ def shell(tmp_path):
         ("$cylx info s.xyz >&-", 4, "standard output: is closed"),
         pytest.param("$cylx info --json s.xyz >/dev/full", 4, "standard output: cannot be written", marks=FULL),
         pytest.param("$cylx info nosuch.xyz 2>/dev/full", 3, "", marks=FULL),
+        ("NUMBA_NUM_THREADS=0 $cylx info s.xyz", 0, ""),
+        ("NUMBA_NUM_THREADS=many $cylx info s.xyz", 0, ""),
         ("mkdir d; cd d; rmdir ../d; $cylx info s.xyz", 3, "s.xyz: no such file"),
         ("mkdir d; cd d; rmdir ../d; $cylx synth single a.ply", 3, "the working folder has been removed"),
         (

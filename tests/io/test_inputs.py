@@ -5,6 +5,7 @@ import io
 import os
 import sys
 import threading
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,6 +96,25 @@ def test_a_name_that_is_no_utf8_is_told_as_utf8(tmp_path):
     with open(path, "w") as file:  # noqa: PTH123  a path as text, as users give it
         file.write("1 2 3\n")
     assert read_cloud(path).source.file == f"{tmp_path}/?.xyz"
+
+
+@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there are no such devices here")
+def test_a_device_that_never_ends_is_refused(tmp_path):
+    (tmp_path / "scan.ply").symlink_to("/dev/zero")
+    for path in ("/dev/zero", tmp_path / "scan.ply"):
+        with pytest.raises(InputError, match=rf"^{path}: is a device; give a file or a pipe$"):
+            read_cloud(path)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need a privilege there")
+def test_a_link_that_leads_nowhere_says_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("scan.ply").symlink_to("disk/\x1b[31mscan.ply")
+    with pytest.raises(InputError) as refused:
+        read_cloud("scan.ply")
+    assert str(refused.value) == (
+        "scan.ply: is a link to 'disk/\\x1b[31mscan.ply', which is not there; check where it leads"
+    )
 
 
 def test_json_objects(tmp_path, monkeypatch):

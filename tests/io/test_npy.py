@@ -120,6 +120,12 @@ def test_wrong_arrays_are_named(put, array, message, suffix):
     assert str(refused.value) == f"{name}: {message}"
 
 
+def test_an_archive_of_nothing_holds_no_array(put):
+    with pytest.raises(InputError) as refused:
+        read_cloud(put("scan.npz"))
+    assert str(refused.value) == "scan.npz: holds no array; save the points alone, or as points=…"
+
+
 def test_two_arrays_are_one_too_many(put):
     with pytest.raises(InputError) as refused:
         read_cloud(put("scan.npz", a=POINTS, b=POINTS))

@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from cylx.io.existing import has_file
+
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
     from cylx.records import PointCloud
@@ -53,9 +55,9 @@ def as_written(job: Job) -> Job:
     from cylx.io import LAS_SUFFIXES
 
     name = job.annotated
-    if name is None or Path(name).suffix.lower() not in LAS_SUFFIXES or Path(name).is_file():
+    if name is None or Path(name).suffix.lower() not in LAS_SUFFIXES or has_file(name):
         return job
-    return replace(job, annotated=_as_ply(name)) if Path(_as_ply(name)).is_file() else job
+    return replace(job, annotated=_as_ply(name)) if has_file(_as_ply(name)) else job
 
 
 def _as_ply(name: str) -> str:

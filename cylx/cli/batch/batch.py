@@ -23,6 +23,7 @@ from cylx.cli.terminal.failures import DEBUG, tell
 from cylx.cli.terminal.signals import check_heard
 from cylx.cli.terminal.stopwatch import peak_memory
 from cylx.errors import BatchError, NothingFoundError, OutputError
+from cylx.io.existing import has_file
 
 if TYPE_CHECKING:
     from cylx.cli.batch.jobs import Job
@@ -68,7 +69,7 @@ class Batch:
         if self.options.resume and not overwrite:
             check_own(self.jobs)
         for name in self.summaries:
-            old = Path(name).is_file()
+            old = has_file(name)
             if old and not overwrite and not (self.options.resume and self._is_summary(name)):
                 remedy = "give --resume, --overwrite or --no-summary, or another folder"
                 raise OutputError(printable(name), "exists already", remedy)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cylx.errors import OutputError, UsageError
+from cylx.io.existing import has_anything, has_file, has_folder
 from cylx.io.outputs import STANDARD_OUTPUT, STREAM
 
 RESULT, ANNOTATED, REJECTED, TRUTH = ".cylinders.json", ".annotated", ".rejected.json", ".truth.json"
@@ -200,7 +201,7 @@ def _inside(output: str, scan: str, ending: str) -> str:
 
 def is_folder(output: str) -> bool:
     """Return whether an output is a folder, or its name ends like one."""
-    return output != STREAM and (Path(output).is_dir() or is_slashed(output))
+    return output != STREAM and (has_folder(output) or is_slashed(output))
 
 
 def is_slashed(output: str) -> bool:
@@ -216,14 +217,14 @@ def _check_batch(
         raise UsageError("-", "standard input is one of several inputs", "give it alone")
     if annotated is not None:
         raise UsageError("--annotated", "names one file for several inputs", "leave it out, or give one input")
-    if output is not None and (output == STREAM or Path(output).is_file()):
+    if output is not None and (output == STREAM or has_file(output)):
         raise UsageError(f"-o {output}", "is one file for several inputs", "give a folder, or one input")
     for option, name in folders.items():
         if name is not None and not is_folder(name):
             raise UsageError(f"{option} {name}", "is one file for several inputs", "give a folder, or one input")
     made = output is not None and is_slashed(output)
     for name in (None if made else output, *folders.values()):
-        if name is not None and not Path(name).is_dir():
+        if name is not None and not has_folder(name):
             raise OutputError(name, "no such folder", "create it first")
 
 
@@ -239,4 +240,4 @@ def _check_twins(jobs: Sequence[Job]) -> None:
 
 def _is_there(scan: str) -> bool:
     """Return whether an input exists as far as can be checked; the reader reports missing files."""
-    return scan == STREAM or (Path(scan).exists() and not Path(scan).is_dir())
+    return scan == STREAM or (has_anything(scan) and not has_folder(scan))

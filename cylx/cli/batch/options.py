@@ -12,6 +12,7 @@ from cylx.cli.batch.jobs import is_folder, is_slashed
 from cylx.cli.batch.memory import cores, free_memory, memory_needed
 from cylx.cli.batch.summary import LIST, TABLE
 from cylx.errors import OutputError, UsageError
+from cylx.io.existing import has_anything, has_folder
 
 AUTO = 0
 
@@ -51,7 +52,7 @@ class BatchOptions(NamedTuple):
             return output
         if output is not None:
             raise UsageError("--out-dir", "cannot be combined with -o", "leave one of them out")
-        if Path(self.out_dir).exists() and not Path(self.out_dir).is_dir():
+        if has_anything(self.out_dir) and not has_folder(self.out_dir):
             raise UsageError(f"--out-dir {self.out_dir}", "is not a folder", "choose another name")
         return self.out_dir if is_slashed(self.out_dir) else self.out_dir + os.sep
 
@@ -97,7 +98,7 @@ def made_folder(output: str | None) -> Iterator[None]:
     OutputError
         If it cannot be created.
     """
-    if output is None or not is_slashed(output) or Path(output).is_dir():
+    if output is None or not is_slashed(output) or has_folder(output):
         yield
         return
     try:

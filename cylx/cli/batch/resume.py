@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from cylx.errors import CylxError, InputError, OutputError
+from cylx.io.existing import has_file
 from cylx.io.outputs import STREAM
 
 if TYPE_CHECKING:
@@ -52,14 +53,14 @@ def finished_before(job: Job, settings: Config, selection: Selection) -> Result 
     from cylx.version import __version__
 
     job = as_written(job)
-    if STREAM in (job.scan, *job.outputs) or not all(Path(name).is_file() for name in job.written(0)):
+    if STREAM in (job.scan, *job.outputs) or not all(has_file(name) for name in job.written(0)):
         return None
     try:
         result = Result.parse(read_json(job.result), job.result)
         if result.cylx_version != __version__ or result.input.file != recorded_name(job.scan):
             return None
         same = is_of_settings(result, settings) and result.input.is_of(selection)
-        same = same and all(Path(name).is_file() for name in job.written(len(result.cylinders)))
+        same = same and all(has_file(name) for name in job.written(len(result.cylinders)))
         same = same and _has_units(job, result) and _belong(job, result) and result.input.sha256 == sha256_of(job.scan)
     except (CylxError, OSError):
         return None
@@ -131,7 +132,7 @@ def _belong(job: Job, result: Result) -> bool:
         return True
     mesh, _ = mesh_of(job.mesh, result)
     file = Path(job.mesh)
-    return (file.read_bytes() if file.is_file() else None) == mesh
+    return (file.read_bytes() if has_file(file) else None) == mesh
 
 
 def check_own(jobs: Sequence[Job]) -> None:
@@ -146,7 +147,7 @@ def check_own(jobs: Sequence[Job]) -> None:
 
     for job in jobs:
         for name in job.outputs:
-            if Path(name).is_file() and not _is_own(name, job):
+            if has_file(name) and not _is_own(name, job):
                 fault = "exists already, and cylx did not write it"
                 raise OutputError(printable(name), fault, "choose another name, or give --overwrite")
 
@@ -178,7 +179,7 @@ def _is_own(name: str, job: Job) -> bool:
     mark = _OWN_MESH.get(Path(name).suffix.lower())
     if name == job.mesh and mark is not None:
         return mark.match(head) is not None
-    return Path(job.result).is_file() and is_own_json(job.result)
+    return has_file(job.result) and is_own_json(job.result)
 
 
 def _head(name: str) -> bytes:

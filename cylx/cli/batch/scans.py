@@ -11,6 +11,7 @@ from typing import NoReturn
 from cylx.cli.batch.jobs import ANNOTATED
 from cylx.cli.batch.summary import TABLE, is_own_table
 from cylx.errors import InputError
+from cylx.io.existing import has_file, has_folder
 from cylx.io.outputs import STREAM
 
 
@@ -43,7 +44,7 @@ def _scans_of(name: str, *, recursive: bool) -> list[str]:
     """Return the scans that one argument stands for."""
     if name == STREAM:
         return [name]
-    if Path(name).is_dir():
+    if has_folder(name):
         return _scans_in(name, recursive=recursive)
     if glob.has_magic(name) and not os.path.lexists(name):
         return _scans_like(name)
@@ -70,7 +71,7 @@ def _scans_like(pattern: str) -> list[str]:
 
     suffix = Path(pattern).suffix
     any_suffix = suffix != "" and not glob.has_magic(suffix)
-    files = sorted(path for path in glob.glob(pattern, recursive=True) if Path(path).is_file())  # noqa: PTH207  as a shell
+    files = sorted(path for path in glob.glob(pattern, recursive=True) if has_file(path))  # noqa: PTH207  as a shell
     suffixes = cloud_suffixes()
     scans = [path for path in files if any_suffix or cloud_suffix(path) in suffixes]
     scans = [path for path in scans if _is_foreign(path)]
@@ -94,7 +95,7 @@ def _files_in(folder: str, *, recursive: bool) -> Iterator[str]:
         folders[:] = sorted(name for name in folders if recursive and not name.startswith("."))
         shown = sorted(name for name in files if not name.startswith("."))
         paths = (Path(place, name) for name in shown)
-        yield from (str(path) for path in paths if path.is_file())  # no pipe, and no link to a device
+        yield from (str(path) for path in paths if has_file(path))  # no pipe, and no link to a device
 
 
 def _is_foreign(path: str) -> bool:

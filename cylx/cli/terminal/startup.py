@@ -50,6 +50,7 @@ def own_process() -> Iterator[None]:
     occupy_closed_streams()
     listen()
     os.environ.pop("NUMBA_DISABLE_JIT", None)  # without compiling, a scan would take days
+    os.environ.pop("NUMBA_NUM_THREADS", None)  # of threads that no kernel uses; Numba cannot be imported with 0
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     # processes that are started look for no modules in the current folder, which may be full of files of others; they
     # are told where the modules are (for Python 3.10, which does not know this variable, see `isolate_processes`)

@@ -1,6 +1,7 @@
 """Bad input at the command line: one line, the right exit code, nothing written, no traceback."""
 
 import errno
+import os
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,41 @@ def test_a_scan_that_cannot_be_used_is_refused(assert_refused, tmp_path, case):
 def test_so_is_one_from_standard_input(assert_refused, tmp_path, case):
     _, content, fault = SCANS[case]
     assert_refused(3, fault, "-", "-o", tmp_path / "out.json", input=content)
+
+
+LONG = "x" * 300  # more than any system takes
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "fault"),
+    [
+        ([f"{LONG}.xyz"], 3, f"{LONG}.xyz: cannot be read: file name too long"),
+        (["scan.xyz", "-o", f"{LONG}.json"], 4, f"{LONG}.json: cannot be written: file name too long"),
+        (["scan.xyz", "-o", f"{LONG}/"], 4, f"{LONG}/: cannot be created: file name too long"),
+        (["scan.xyz", "--out-dir", LONG], 4, f"{LONG}/: cannot be created: file name too long"),
+        (["scan.xyz", "--annotated", f"{LONG}.las"], 4, f"{LONG}.las: cannot be written: file name too long"),
+        (["scan.xyz", "--report", f"{LONG}.html"], 4, f"{LONG}.html: cannot be written: file name too long"),
+        (["scan.xyz", "-c", f"{LONG}.yaml"], 2, f"{LONG}.yaml: cannot be read: File name too long"),
+        (["scan.xyz", "--catalogue", f"{LONG}.csv"], 2, f"{LONG}.csv: cannot be read: File name too long"),
+    ],
+)
+@pytest.mark.skipif(os.name == "nt", reason="other words are said there")
+@pytest.mark.usefixtures("in_its_folder")
+def test_a_name_that_is_too_long_is_refused(assert_refused, options, code, fault):
+    assert_refused(code, fault, *options)
+
+
+def test_a_folder_that_may_not_be_searched_is_refused(assert_refused, in_its_folder, monkeypatch):
+    as_ever = os.stat
+
+    def stat_others(path, *args, **settings):
+        if str(path).startswith("secret"):
+            raise PermissionError(errno.EACCES, "Permission denied", path)
+        return as_ever(path, *args, **settings)
+
+    monkeypatch.setattr(os, "stat", stat_others)  # whoever runs the tests may be root, who may search them all
+    assert_refused(4, "secret/r.json: cannot be written: permission denied", in_its_folder, "-o", "secret/r.json")
+    assert_refused(3, "secret/scan.ply: no such file", "secret/scan.ply")
 
 
 def test_a_folder_is_refused(assert_refused, tmp_path):
