@@ -182,7 +182,9 @@ def used():
 def run_of(scene, folder, extra):
     """Extract a scene; give what was measured as plain data, with the name of the result."""
     output = Path(folder) / f"{scene.stem}-{'tiled' if extra else 'whole'}.json"
-    command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", *extra]
+    profile = output.with_suffix(".profile.json")
+    command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", "--profile", profile]
+    command += extra
     code, seconds, busy, peak = watched(command)
     row = {"code": code, "seconds": seconds, "busy": busy, "peak": peak, "result": str(output)}
     if code == 0:
@@ -190,6 +192,7 @@ def run_of(scene, folder, extra):
         tiles = result.get("tiles", {"count": 1, "joined": 0})
         row |= {"points": truth["points"], "f1": evaluate(truth, result).f1, "pipes": len(truth["cylinders"])}
         row |= {"tiles": tiles["count"], "joined": tiles["joined"]}
+        row["stages"] = json.loads(profile.read_text(encoding="utf-8"))["inputs"][0]["stages"]
     return row
 
 
