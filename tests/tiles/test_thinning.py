@@ -50,10 +50,11 @@ def test_the_points_are_those_of_the_whole(rng, tmp_path, monkeypatch, side):
 def test_what_was_left_by_a_killed_run_does_not_count(rng, tmp_path):
     points = rng.uniform(0, 1, (2000, 3))
     first, *_ = used([points], Selection(voxel=0.2), tmp_path)
-    with pytest.raises(RuntimeError), open_scratch(tmp_path, "result", {}, resume=True) as scratch:
-        for name in (thinning.THINNED, "voxel-points-0", "voxel-rows-0", "voxel-range-0"):
-            scratch.append(name, np.zeros(24, np.int64))
-        raise RuntimeError
+    killed = open_scratch(tmp_path, "result", {}, resume=True)
+    scratch = killed.__enter__()
+    for name in (thinning.THINNED, "voxel-points-0", "voxel-rows-0", "voxel-range-0"):
+        scratch.append(name, np.zeros(24, np.int64))
+    killed.__exit__(RuntimeError, RuntimeError(), None)
     again, *_ = used([points], Selection(voxel=0.2), tmp_path, resume=True)
     assert (again == first).all()
 
