@@ -169,11 +169,18 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
     return square < MOST_CHI_SQUARE_IN_LINE
 
 
-def _is_another_size(a: Finding, b: Finding, gap: float) -> bool:
+def is_another_size(a: Finding, b: Finding, gap: float) -> bool:
     """Return whether a piece that lies further away than either is long has another radius, beyond their errors.
 
     Over so long a gap, pipes that lie in line by chance are as likely as one pipe; one fit may explain both within the
     noise though each of them is known much better than that.
+
+    Parameters
+    ----------
+    a, b : Finding
+        Each fitted to its own points.
+    gap : float
+        Between them, along the axis.
     """
     one, two = a.segment, b.segment
     if gap <= 2.0 * max(one.half, two.half):
@@ -200,7 +207,7 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
     across = two.point - one.point
     height = float(across @ one.direction)
     gap, model = abs(height) - one.half - two.half, one.model.copy()
-    if are_distinct(a, b, indexed, gap) or _is_another_size(a, b, gap):
+    if are_distinct(a, b, indexed, gap) or is_another_size(a, b, gap):
         return None
     far = gap > FAR_APART * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
     if far:
