@@ -15,11 +15,11 @@ from functools import partial
 import numpy as np
 
 from cylx.evidence.ends import are_distinct
+from cylx.evidence.sizes import is_another_size
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import coordinates_of
 from cylx.records import Finding, IndexedCloud, Segment
-from cylx.stages.merging import is_another_size
 
 PER_PIECE = 12.0
 """Points that a piece of the height should hold on the average."""
