@@ -4,7 +4,8 @@ A piece is a rack of 6 x 6 m with fifteen pipes in layers, which lie on I-beams,
 through all pieces of a row. The memory is that of all processes together, looked at up to ten times a second.
 
 With `--kept`, what was measured is written down run by run, and is not measured again: a plant of 100 M points takes
-hours on a machine that has other work. The picture has all that is kept.
+hours on a machine that has other work. The picture has all that is kept. What was not measured to its end may be added
+there by hand with `"projected": true`; it is drawn as an open circle, and does not count for the slope.
 """
 
 import argparse
@@ -221,12 +222,18 @@ def draw(kept, folder):
     for number, name in enumerate(("in tiles", WHOLE)):
         rows = [row for key, row in kept.items() if not row["code"] and key.endswith(f" {WHOLE}") == (name == WHOLE)]
         rows.sort(key=lambda row: row["points"])
+        rows, projected = (
+            [row for row in rows if not row.get("projected")],
+            [row for row in rows if row.get("projected")],
+        )
         if not rows:
             continue
         points = [row["points"] for row in rows]
         told = f"{name}, slope {slope_of(rows):.2f}" if len(rows) > 1 else name
         left.plot(points, [row["busy"] for row in rows], "o-", color=COLORS[number], label=told)
         right.plot(points, [row["peak"] for row in rows], "o-", color=COLORS[number], label=name)
+        for row in projected:
+            left.plot(row["points"], row["busy"], "o", color=COLORS[number], fillstyle="none", label="projected")
     left.set_ylabel("seconds of processors")
     right.set_ylabel("peak memory of all processes, MB")
     for axis in (left, right):
