@@ -222,10 +222,8 @@ def draw(kept, folder):
     for number, name in enumerate(("in tiles", WHOLE)):
         rows = [row for key, row in kept.items() if not row["code"] and key.endswith(f" {WHOLE}") == (name == WHOLE)]
         rows.sort(key=lambda row: row["points"])
-        rows, projected = (
-            [row for row in rows if not row.get("projected")],
-            [row for row in rows if row.get("projected")],
-        )
+        projected = [row for row in rows if row.get("projected")]
+        rows = [row for row in rows if row not in projected]
         if not rows:
             continue
         points = [row["points"] for row in rows]
