@@ -44,6 +44,7 @@ def extract_tiled(
     radius: tuple[float | None, float | None] | None = None,
     max_cylinders: int | None = None,
     crop: Crop | None = None,
+    voxel: float | None = None,
     every: int | None = None,
     classes: Sequence[int] | None = None,
     threads: int = 1,
@@ -70,7 +71,7 @@ def extract_tiled(
         A new NPY file, for the `cylinder_id` and the `residual` of each row of the source.
     rejected : bool
         Whether to give what was not accepted, too.
-    preset, config, overrides, seed, radius, max_cylinders, crop, every, classes, observer
+    preset, config, overrides, seed, radius, max_cylinders, crop, voxel, every, classes, observer
         As for `extract`.
     threads : int
         Number of threads of each process; the result does not depend on it.
@@ -106,7 +107,7 @@ def extract_tiled(
         options=named_options(seed=seed, radius=radius, max_cylinders=max_cylinders),
     )
     chosen = None if classes is None else tuple(classes)
-    selection = Selection(crop=crop, every=every, classes=chosen)
+    selection = Selection(crop=crop, voxel=voxel, every=every, classes=chosen)
     observer = observer or SilentObserver()
     compile_kernels(observer)
     with ExitStack() as stack:

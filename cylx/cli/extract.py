@@ -143,7 +143,7 @@ def extract(
     if tiles.certain:
         from cylx.cli.batch.tiled import check_tiles
 
-        check_tiles([*jobs, *others], settings, selection, runs=runs)
+        check_tiles([*jobs, *others], settings, runs=runs)
     batch = Batch(run, jobs, options, summaries)
     with made_folder(output):
         check_outputs(jobs, [], overwrite=overwrite or options.resume)

@@ -16,12 +16,13 @@ from cylx.scene import Prepared
 from cylx.stages.extending import extend
 from cylx.stages.labelling import label_points, surface_points
 from cylx.stages.merging import drop_claimed, merge_pieces
+from cylx.stages.parting import parted
 
 
 def join_findings(
     prepared: Prepared, indexed: IndexedCloud, windows: Candidates, findings: Sequence[Finding], doubtful: set[int]
 ) -> list[tuple[int | None, Finding]]:
-    """Join findings of one cylinder, extend them where the points go on, and drop what better ones have claimed.
+    """Join findings of one cylinder, extend and part them, and drop what better ones have claimed.
 
     Blends are joined by themselves, and dropped where their points belong to a cylinder.
 
@@ -53,7 +54,8 @@ def join_findings(
     longer = [extend(piece, indexed, judge.join) for piece in pieces]
     if any(one is not other for one, other in zip(longer, pieces, strict=True)):
         pieces = merge_pieces(longer, indexed, judge.join)
-    cylinders = drop_claimed(pieces, count)
+    apart = [part for piece in pieces for part in parted(piece, indexed, judge.join)]
+    cylinders = drop_claimed(apart, count)
     arcs = drop_claimed([one for _, one in there if one.blend], count, cylinders)
     blends = drop_claimed(merge_pieces(arcs, indexed, judge.join_blend), count, cylinders)
     finished = [(index.get(id(one)), one if id(one) in index else judge.finish(one)) for one in (*cylinders, *blends)]

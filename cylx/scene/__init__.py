@@ -6,7 +6,7 @@ from cylx.scene.noise_variation import noise_by_place, noise_by_size
 from cylx.scene.prepare import Prepared, prepare
 from cylx.scene.priors import catalogue_of, known_of, out_of_range, radius_range
 from cylx.scene.resolve import resolve, thinnest
-from cylx.scene.selection import rows_selected, select
+from cylx.scene.selection import check_voxel, one_a_voxel, rows_selected, select
 
 __all__ = [
     "Patches",
@@ -15,12 +15,14 @@ __all__ = [
     "catalogue_of",
     "cell_cube",
     "check_usable",
+    "check_voxel",
     "known_of",
     "make_frame",
     "measure_scene",
     "measure_surface",
     "noise_by_place",
     "noise_by_size",
+    "one_a_voxel",
     "out_of_range",
     "prepare",
     "radius_range",

@@ -58,7 +58,7 @@ def select(cloud: PointCloud, selection: Selection) -> PointCloud:
         raise InputError(cloud.source.file, "no point is selected", f"select more; the points lie from {low} to {high}")
     if selection.voxel is not None:
         chosen = np.flatnonzero(keep)
-        _check_voxel(cloud, selection.voxel)
+        check_voxel(cloud.points, selection.voxel, cloud.source.file)
         keep[:] = False
         keep[chosen[one_a_voxel(cloud.points[chosen], selection.voxel)]] = True
     valid = np.zeros(cloud.rows, dtype=np.bool_)
@@ -163,6 +163,29 @@ def one_a_voxel(points: FloatArray, side: float) -> IndexArray:
     return np.sort(order[np.flatnonzero(np.diff(voxels, prepend=-1))])
 
 
+def check_voxel(points: FloatArray, side: float, place: str) -> None:
+    """Refuse voxels that the coordinates cannot tell apart.
+
+    Parameters
+    ----------
+    points : ndarray of shape (N, 3)
+        At least one.
+    side : float
+        Side of a voxel, scene units.
+    place : str
+        The cloud, for the error.
+
+    Raises
+    ------
+    InputError
+        If a coordinate is 2**52 sides or more.
+    """
+    with np.errstate(over="ignore"):
+        if np.abs(points).max() / np.float64(side) >= _MOST_CELLS:
+            fault = f"voxels of {side:g} are too small for these coordinates"
+            raise InputError(place, fault, "use larger ones")
+
+
 def _grouped(cells: FloatArray) -> tuple[IndexArray, IndexArray]:
     """Return an order that groups the points by voxel, and the number of the voxel of each point."""
     low = cells.min(axis=0)
@@ -176,13 +199,6 @@ def _grouped(cells: FloatArray) -> tuple[IndexArray, IndexArray]:
     order = np.lexsort(cells.T)
     changes = (np.diff(cells[order], axis=0) != 0.0).any(axis=1)
     return np.concatenate([[0], np.cumsum(changes)]), order
-
-
-def _check_voxel(cloud: PointCloud, side: float) -> None:
-    with np.errstate(over="ignore"):
-        if np.abs(cloud.points).max() / np.float64(side) >= _MOST_CELLS:
-            fault = f"voxels of {side:g} are too small for these coordinates"
-            raise InputError(cloud.source.file, fault, "use larger ones")
 
 
 def _classes_of(cloud: PointCloud) -> NDArray[Any]:

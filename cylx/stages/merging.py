@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from cylx.evidence.ends import are_distinct
+from cylx.evidence.sizes import LEAST_RADIUS_DIFFERENCE, is_another_size
 from cylx.fits.robust import FIT_BEYOND_ENDS, TUKEY, TUKEY_SPREAD, WeightSchedule, fit_cylinder
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import DIRECTION, POINT, RADIUS, coordinates_of
@@ -17,8 +18,8 @@ LEAST_COSINE_OF_PIECES = math.cos(math.radians(8.0))
 """Axes of two pieces of one pipe differ less; the rest is decided by a fit to both."""
 LEAST_COSINE_OF_THE_SAME, MOST_RADIUS_DIFFERENCE, MOST_OFFSET_OF_THE_SAME = math.cos(math.radians(4.0)), 0.1, 0.15
 """A segment that differs less from a known one, in direction, relative radius and offset in radii, is the same."""
-LEAST_RADIUS_DIFFERENCE, DEVIATIONS_OF_THE_SAME = 0.03, 4.0
-"""The relative radius may always differ by this much, and else by so many deviations of the points of both."""
+DEVIATIONS_OF_THE_SAME = 4.0
+"""The relative radius may always differ by the least difference, else by so many deviations of the points of both."""
 HALF, SPREAD = 7, 8
 """Where rows of segments have half the height and the spread."""
 LEAST_RADIUS_RATIO = 0.75
@@ -169,20 +170,6 @@ def _point_at_each_other(a: Finding, b: Finding) -> bool:
     return square < MOST_CHI_SQUARE_IN_LINE
 
 
-def _is_another_size(a: Finding, b: Finding, gap: float) -> bool:
-    """Return whether a piece that lies further away than either is long has another radius, beyond their errors.
-
-    Over so long a gap, pipes that lie in line by chance are as likely as one pipe; one fit may explain both within the
-    noise though each of them is known much better than that.
-    """
-    one, two = a.segment, b.segment
-    if gap <= 2.0 * max(one.half, two.half):
-        return False
-    # a radius is known about as well as an axis
-    certain = ERRORS_OF_OFFSET * math.hypot(a.offset_error, b.offset_error)
-    return abs(one.radius - two.radius) > max(LEAST_RADIUS_DIFFERENCE * min(one.radius, two.radius), certain)
-
-
 def _is_bridged(indexed: IndexedCloud, model: FloatArray, half: float, width: float) -> bool:
     """Return whether points lie on a cylinder about its middle, and almost none beside its surface."""
     reach = model[RADIUS] + max(0.5 * model[RADIUS], 4.0 * width)
@@ -200,7 +187,7 @@ def _join(a: Finding, b: Finding, error: float, indexed: IndexedCloud, judge: Ju
     across = two.point - one.point
     height = float(across @ one.direction)
     gap, model = abs(height) - one.half - two.half, one.model.copy()
-    if are_distinct(a, b, indexed, gap) or _is_another_size(a, b, gap):
+    if are_distinct(a, b, indexed, gap) or is_another_size(a, b, gap):
         return None
     far = gap > FAR_APART * (one.half + two.half) and error > MOST_OFFSET_OF_PIECES * one.radius
     if far:

@@ -1,17 +1,21 @@
 """A whole -> its pieces: two bores in line, or two collars of a shaft, that were followed across their gap.
 
-A surface is followed across gaps, as most pipes are hidden in places. Where both sides of a gap are seen all round, and
-end there in a cut with something that adjoins it, nothing is hidden: there are two cylinders.
+A surface is followed across gaps, as most pipes are hidden in places. Where both sides of a gap are seen all round,
+and end there in a cut with something that adjoins it, nothing is hidden: there are two cylinders. There are two as
+well where the gap is longer than either side, and each side by itself has another radius: what touches the surface
+between pipes that lie in line by chance, such as the beams that they lie on, leads from one to the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from cylx.evidence.ends import are_distinct
+from cylx.evidence.sizes import is_another_size
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.coverage import covered_angle
 from cylx.geometry.cylinder import coordinates_of
@@ -24,6 +28,8 @@ SPARSE = 0.15
 """Pieces that hold less than this share of the median are empty: something crosses."""
 LEAST_GAP = 0.15
 """Gaps of so many radii are looked at."""
+STRIP = 0.5
+"""What lies between two gaps, shorter than either, and covers less than this share of the arc, may cross."""
 LEAST_POINTS = 40
 """Points without which a piece is none."""
 
@@ -31,7 +37,7 @@ Judge = Callable[[Segment, Finding], Finding | None]
 
 
 def parted(finding: Finding, indexed: IndexedCloud, judge: Judge) -> list[Finding]:
-    """Part a cylinder at the gaps on both sides of which it ends.
+    """Part a cylinder at the gaps on both sides of which it ends, or has another size.
 
     Parameters
     ----------
@@ -48,21 +54,34 @@ def parted(finding: Finding, indexed: IndexedCloud, judge: Judge) -> list[Findin
         The pieces, if all of them are cylinders; else the finding alone.
     """
     heights, _, angles = coordinates_of(indexed.points, finding.points, finding.segment.model)
-    gaps = _gaps(heights, finding.segment)
+    cut = partial(_piece, finding, heights, angles)
+    groups = _groups_of(_gaps(heights, finding.segment), heights, angles, STRIP * finding.coverage)
     pieces: list[Finding] = []
     low = -np.inf
-    for first, last in gaps:
-        one = _piece(finding, heights, angles, low, first)
-        other = _piece(finding, heights, angles, last, np.inf)
-        if one is not None and other is not None and are_distinct(one, other, indexed, last - first):
-            pieces.append(one)
-            low = last
+    for number, gaps in enumerate(groups):
+        first, last = gaps[0][0], gaps[-1][1]
+        end = groups[number + 1][0][0] if number + 1 < len(groups) else np.inf
+        differ = _have_other_sizes(cut(low, first), cut(last, end), last - first, judge)
+        for gap in [(first, last)] if differ else gaps:
+            one, rest = cut(low, gap[0]), cut(gap[1], np.inf)
+            if one is None or rest is None:
+                continue
+            if differ or are_distinct(one, rest, indexed, gap[1] - gap[0]):
+                pieces.append(one)
+                low = gap[1]
     if not pieces:
         return [finding]
-    rest = _piece(finding, heights, angles, low, np.inf)
-    judged = [None if one is None else judge(one.segment, finding) for one in [*pieces, rest]]
+    judged = [None if one is None else judge(one.segment, finding) for one in [*pieces, cut(low, np.inf)]]
     kept = [one for one in judged if one is not None]
     return kept if len(kept) == len(judged) else [finding]
+
+
+def _have_other_sizes(one: Finding | None, other: Finding | None, gap: float, judge: Judge) -> bool:
+    """Return whether both sides of a gap longer than either are cylinders, of different radii."""
+    if one is None or other is None or gap <= 2.0 * max(one.segment.half, other.segment.half):
+        return False
+    fitted = judge(one.segment, one), judge(other.segment, other)
+    return fitted[0] is not None and fitted[1] is not None and is_another_size(fitted[0], fitted[1], gap)
 
 
 def _gaps(heights: FloatArray, segment: Segment) -> list[tuple[float, float]]:
@@ -78,6 +97,25 @@ def _gaps(heights: FloatArray, segment: Segment) -> list[tuple[float, float]]:
         if len(before) and len(after) and edges[last] - edges[first] > LEAST_GAP * segment.radius:
             found.append((float(before.max()), float(after.min())))
     return found
+
+
+def _groups_of(
+    gaps: list[tuple[float, float]], heights: FloatArray, angles: FloatArray, most: float
+) -> list[list[tuple[float, float]]]:
+    """Group gaps: with the next one if what lies between is shorter than either and covers less than some angle.
+
+    Such is what crosses in a long gap and touches the surface.
+    """
+    groups: list[list[tuple[float, float]]] = []
+    for gap in gaps:
+        before = groups[-1][-1] if groups else gap
+        between = (heights >= before[1]) & (heights <= gap[0])
+        short = gap[0] - before[1] < max(gap[1] - gap[0], before[1] - before[0])
+        if groups and short and covered_angle(angles[between]) < most:
+            groups[-1].append(gap)
+        else:
+            groups.append([gap])
+    return groups
 
 
 def _piece(finding: Finding, heights: FloatArray, angles: FloatArray, low: float, high: float) -> Finding | None:

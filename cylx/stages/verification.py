@@ -36,6 +36,9 @@ GOES_ON = 0.25
 """Density of points past an end of an arc, as a share of its own, from which it goes on tangentially."""
 SURELY_GOES_ON = 0.5
 """The same, past one end alone, of what would pass for a cylinder."""
+LEAST_OF_ARC = 0.5
+"""Share of the arc between two planes that points have to cover: what is seen where the planes touch it alone, and not
+between, is two planes that face each other, such as the flanges of a beam."""
 CLOSED, DEVIATES = math.radians(300.0), 1.4
 """Angle and lack of fit from which a surface may be that of a prism."""
 LEAST_SHARE = 1e-4
@@ -198,7 +201,7 @@ def _prism(shell: Shell, form: dict[str, float], radius: float, scatter: float, 
 
 
 def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:
-    """Return whether a segment goes on tangentially past an end of its arc.
+    """Return whether a segment goes on tangentially past an end of its arc, and its arc is seen.
 
     Parameters
     ----------
@@ -206,6 +209,8 @@ def may_be_arc(verdict: Verdict, *, surely: bool = False) -> bool:
     surely : bool
         Whether it would pass for a cylinder otherwise: then it must go on at both ends, or as densely as the arc.
     """
+    if verdict.coverage < LEAST_OF_ARC * verdict.measures.get("arc", 0.0):
+        return False
     one, both = verdict.measures.get("tangent", 0.0), verdict.measures.get("tangent_both", 0.0)
     return (both >= GOES_ON or one >= SURELY_GOES_ON) if surely else one >= GOES_ON
 

@@ -15,7 +15,7 @@ from cylx.io.streamed_cloud import StreamedCloud
 from cylx.records import Observer, Selection
 from cylx.scene import check_usable
 from cylx.tiles.search import margin_name, points_name, rows_name
-from cylx.tiles.survey import Survey, points_of, survey
+from cylx.tiles.survey import Kept, Survey, points_of, survey
 from cylx.tiles.tree import Tree, grow_tree, usual_side
 
 SAMPLED = 1 << 20
@@ -35,11 +35,13 @@ def stage(observer: Observer, name: str, total: int | None = None) -> Iterator[N
     observer.stage_finished(name, perf_counter() - started)
 
 
-def survey_once(clouds: list[StreamedCloud], selection: Selection, scratch: Scratch, observer: Observer) -> Survey:
+def survey_once(
+    clouds: list[StreamedCloud], selection: Selection, scratch: Scratch, observer: Observer, kept: Kept | None = None
+) -> Survey:
     """Read the cloud once, or what was kept of it before."""
     if not scratch.has("survey.npz"):
         with stage(observer, "reading", sum(cloud.rows for cloud in clouds)):
-            seen = survey(clouds, selection, SAMPLED, observer.stage_advanced)
+            seen = survey(clouds, selection, SAMPLED, observer.stage_advanced, kept)
         if not seen.points:
             raise InputError(clouds[0].source.file, "no point is selected", "select more")
         scratch.write(
@@ -83,6 +85,7 @@ def cut(
     tree: Tree,
     margin: float,
     observer: Observer,
+    kept: Kept | None = None,
 ) -> list[int]:
     """Write each point into its tile, and into the margins it lies in; return the points of each tile."""
     if scratch.has("cut.json"):
@@ -94,7 +97,7 @@ def cut(
     waiting: dict[str, list[np.ndarray[Any, Any]]] = {}
     held = 0
     with stage(observer, "cutting", sum(cloud.rows for cloud in clouds)):
-        for points, rows in points_of(clouds, selection, lambda _, table: observer.stage_advanced(len(table))):
+        for points, rows in points_of(clouds, selection, lambda _, table: observer.stage_advanced(len(table)), kept):
             for tile, inside, beside in tree.spread(points, margin):
                 counts[tile] += len(inside)
                 held += len(inside) + len(beside)

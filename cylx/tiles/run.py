@@ -25,6 +25,7 @@ from cylx.tiles.rejected import rejected_in
 from cylx.tiles.results import in_order, joining_report, scene_of, stages_of, warnings_of, write_finals
 from cylx.tiles.schedule import Runner
 from cylx.tiles.search import WHOLE, Plan, found_in, points_name, search_tile
+from cylx.tiles.thinning import thin
 from cylx.tiles.tree import usual_side
 
 BASE, A_POINT = 300_000_000, 250
@@ -122,7 +123,7 @@ def extract_in_tiles(
     clouds : list of StreamedCloud
         The files of one cloud.
     selection : Selection
-        Which points to use; `voxel` must be None.
+        Which points to use.
     config : Config
     options : Options
     scratch : Scratch
@@ -144,7 +145,8 @@ def extract_in_tiles(
         If no cylinder could be told from anything else in the cloud.
     """
     check_method(config)
-    seen = survey_once(clouds, selection, scratch, observer)
+    kept = thin(clouds, selection, scratch, observer)
+    seen = survey_once(clouds, selection, scratch, observer, kept)
     most = points_for(options.memory)
     tree, margin = tree_of(seen, options.size, options.buffer, most)
     known = config.scene
@@ -153,7 +155,7 @@ def extract_in_tiles(
     large = LARGE * usual_side(tree, seen.sample)
     of_tiles = config.model_copy(update={"scene": known.model_copy(update={"radius_max": largest})})
     plan = Plan(scratch, of_tiles, tree.boxes, margin, large, options.threads, options.rejected)
-    counts = cut(clouds, selection, scratch, tree, margin, observer)
+    counts = cut(clouds, selection, scratch, tree, margin, observer, kept)
     tiles = list(range(len(tree)))
     whole = [WHOLE] if len(tree) > 1 and 0.0 < large < largest else []
     if whole and not scratch.has(points_name(WHOLE)):

@@ -14,6 +14,8 @@ from cylx.records import Selection
 from cylx.scene import rows_selected
 
 COLORS = ("red", "green", "blue")
+Kept = Callable[[int, int], NDArray[np.bool_]]
+"""Tells for a first row, counted over all files, and a number of rows which of them are used."""
 _MIX = (0x9E3779B97F4A7C15, 0xBF58476D1CE4E5B9, 0x94D049BB133111EB)
 """Odd numbers that mix the digits of a row's number: rows are drawn by it, whatever pieces they come in."""
 
@@ -53,7 +55,10 @@ def hashes(numbers: IndexArray) -> NDArray[np.uint64]:
 
 
 def points_of(
-    clouds: Iterable[StreamedCloud], selection: Selection, look: Callable[[int, NDArray[np.void]], None] | None = None
+    clouds: Iterable[StreamedCloud],
+    selection: Selection,
+    look: Callable[[int, NDArray[np.void]], None] | None = None,
+    kept: Kept | None = None,
 ) -> Iterator[tuple[FloatArray, IndexArray]]:
     """Yield the finite selected points of clouds, one after the other, and their row numbers counted over all.
 
@@ -63,9 +68,11 @@ def points_of(
     ----------
     clouds : iterable of StreamedCloud
     selection : Selection
-        `voxel` and `scan` are ignored.
+        `voxel` is left to `kept`, and `scan` is ignored.
     look : callable, optional
         Is shown the number of the cloud and its rows as read.
+    kept : callable, optional
+        Tells which rows are used; all by default.
     """
     before = 0
     for number, cloud in enumerate(clouds):
@@ -76,11 +83,19 @@ def points_of(
             rows = before + np.arange(start, start + len(table))
             keep = np.isfinite(points).all(axis=1)
             keep &= rows_selected(selection, points, table, rows, cloud.source.file)
+            if kept is not None:
+                keep &= kept(before + start, len(table))
             yield points[keep], rows[keep]
         before += cloud.rows
 
 
-def survey(clouds: list[StreamedCloud], selection: Selection, most: int, advance: Callable[[int], None]) -> Survey:
+def survey(
+    clouds: list[StreamedCloud],
+    selection: Selection,
+    most: int,
+    advance: Callable[[int], None],
+    kept: Kept | None = None,
+) -> Survey:
     """Read clouds once.
 
     Parameters
@@ -91,13 +106,15 @@ def survey(clouds: list[StreamedCloud], selection: Selection, most: int, advance
         Points of the sample, about; the smaller half of it is left.
     advance : callable
         Is told of the rows that were read.
+    kept : callable, optional
+        Tells which rows are used; all by default.
 
     Returns
     -------
     Survey
     """
     low, high, count = np.full(3, np.inf), np.full(3, -np.inf), 0
-    shift, held, kept, sampled = 0, 0, [np.empty((0, 3))], [np.empty(0, np.uint64)]
+    shift, held, drawn_points, sampled = 0, 0, [np.empty((0, 3))], [np.empty(0, np.uint64)]
     colored = [False] * len(clouds)
 
     def look(number: int, table: NDArray[np.void]) -> None:
@@ -105,20 +122,20 @@ def survey(clouds: list[StreamedCloud], selection: Selection, most: int, advance
         if not colored[number] and set(COLORS) <= set(table.dtype.names or ()):
             colored[number] = any(bool(table[color].any()) for color in COLORS)
 
-    for points, rows in points_of(clouds, selection, look):
+    for points, rows in points_of(clouds, selection, look, kept):
         if not len(points):
             continue
         low, high = np.minimum(low, points.min(axis=0)), np.maximum(high, points.max(axis=0))
         count += len(points)
         drawn = hashes(rows)
         on = drawn >> np.uint64(64 - shift) == 0 if shift else np.ones(len(rows), np.bool_)
-        kept.append(points[on])
+        drawn_points.append(points[on])
         sampled.append(drawn[on])
         held += int(on.sum())
         while held > most:
             shift += 1
-            everything, drawn = np.concatenate(kept), np.concatenate(sampled)
+            everything, drawn = np.concatenate(drawn_points), np.concatenate(sampled)
             on = drawn >> np.uint64(64 - shift) == 0
-            kept, sampled, held = [everything[on]], [drawn[on]], int(on.sum())
+            drawn_points, sampled, held = [everything[on]], [drawn[on]], int(on.sum())
     rows_of = tuple(cloud.rows for cloud in clouds)
-    return Survey(rows_of, count, np.array([low, high]), np.concatenate(kept), tuple(colored))
+    return Survey(rows_of, count, np.array([low, high]), np.concatenate(drawn_points), tuple(colored))

@@ -4,10 +4,14 @@ Each step of each tile is timed by itself, in processor seconds of one worker. F
 those measured, and the reading, cutting and writing of the one process that hands out the work grows with the points.
 A free worker takes the next task; all wait at the end of each step. Disks and networks are taken for fast enough; the
 last table says how much they have to bear.
+
+With `--kept`, what was measured is written down, and is not measured again; `--result` keeps what was found, which
+`cylx evaluate` and `cylx diff` compare.
 """
 
 import argparse
 import heapq
+import json
 import sys
 import tempfile
 import time
@@ -19,6 +23,7 @@ from tables import print_header, print_row
 from cylx.config import Config
 from cylx.io import open_scratch, stream_cloud
 from cylx.records import Selection
+from cylx.results import Result
 from cylx.tiles.run import Options, extract_in_tiles
 from cylx.tiles.search import WHOLE
 
@@ -64,8 +69,8 @@ class Steps:
         self.seconds[name] = time.process_time() - self.started
 
 
-def measured(scene, size, memory):
-    """Extract a scene in tiles; give its points, the seconds of its tasks, and those of the process by itself."""
+def measured(scene, size, memory, output):
+    """Extract a scene in tiles; give what was measured as plain data."""
     timed, steps = Timed(), Steps()
     with tempfile.TemporaryDirectory() as folder, open_scratch(Path(folder), str(scene), {}, resume=False) as scratch:
         clouds = [stream_cloud(scene, scratch.path("spool"))]
@@ -74,18 +79,27 @@ def measured(scene, size, memory):
             clouds, Selection(), Config(), Options(size, None, memory, 1), scratch, timed, steps
         ).extraction
         total = time.process_time() - started
-    parallel = sum(sum(each.values()) for each in timed.seconds.values())
+    if output is not None:
+        output.write_text(Result.of(found).to_json(), encoding="utf-8")
     reading = steps.seconds["reading"] + steps.seconds["cutting"]
-    rest = total - parallel - reading
+    about = {"found": str(found), "points": sum(found.rows), "total": total, "reading": reading}
+    return about | {"steps": {step: sorted(map(list, each.items())) for step, each in timed.seconds.items()}}
+
+
+def show(about):
+    """Print what was measured; give the points, the seconds of the tasks, and those of the process by itself."""
+    seconds = {step: dict(each) for step, each in about["steps"].items()}
+    serial = about["total"] - sum(sum(each.values()) for each in seconds.values())
     print_header("step", "tasks", "seconds", "median", "longest")
-    for step, each in timed.seconds.items():
+    for step, each in seconds.items():
         times = [*each.values()] or [0.0]
         print_row(step, str(len(each)), f"{sum(times):.1f}", f"{np.median(times):.2f}", f"{max(times):.2f}")
-    print_row("reading and cutting", "1", f"{reading:.1f}", "", "")
-    print_row("the rest", "1", f"{rest:.1f}", "", "")
-    points, serial = sum(found.rows), total - parallel
-    print(f"\n{found}: {total / points * 1e6:.1f} µs a point, {100.0 * serial / total:.1f} % of them by one process.\n")
-    return points, timed.seconds, serial
+    print_row("reading and cutting", "1", f"{about['reading']:.1f}", "", "")
+    print_row("the rest", "1", f"{serial - about['reading']:.1f}", "", "")
+    points, total = about["points"], about["total"]
+    shares = f"{total / points * 1e6:.1f} µs a point, {100.0 * serial / total:.1f} % of them by one process"
+    print(f"\n{about['found']}: {shares}.\n")
+    return points, seconds, serial
 
 
 def schedule(tasks, workers):
@@ -117,8 +131,16 @@ def main():
     parser.add_argument("scene", type=Path, help="one of those of tiles.py")
     parser.add_argument("--tile", type=float, help="greatest side of a tile, m")
     parser.add_argument("--memory", type=float, default=0.8, help="of a worker, GB")
+    parser.add_argument("--kept", type=Path, metavar="FILE.json", help="what was measured before, or is from now on")
+    parser.add_argument("--result", type=Path, metavar="FILE.json", help="write what was found")
     a = parser.parse_args()
-    scene = measured(a.scene, a.tile, a.memory * 1e9)
+    if a.kept is not None and a.kept.is_file():
+        about = json.loads(a.kept.read_text(encoding="utf-8"))
+    else:
+        about = measured(a.scene, a.tile, a.memory * 1e9, a.result)
+        if a.kept is not None:
+            a.kept.write_text(json.dumps(about, indent=1), encoding="utf-8")
+    scene = show(about)
     print_header("points", "workers", "hours", "times as fast", "busy", "scratch TB", "GB a second")
     for points in POINTS:
         for workers in WORKERS:

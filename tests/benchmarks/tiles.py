@@ -4,7 +4,8 @@ A piece is a rack of 6 x 6 m with fifteen pipes in layers, which lie on I-beams,
 through all pieces of a row. The memory is that of all processes together, looked at up to ten times a second.
 
 With `--kept`, what was measured is written down run by run, and is not measured again: a plant of 100 M points takes
-hours on a machine that has other work. The picture has all that is kept.
+hours on a machine that has other work. The picture has all that is kept. What was not measured to its end may be added
+there by hand with `"projected": true`; it is drawn as an open circle, and does not count for the slope.
 """
 
 import argparse
@@ -182,7 +183,9 @@ def used():
 def run_of(scene, folder, extra):
     """Extract a scene; give what was measured as plain data, with the name of the result."""
     output = Path(folder) / f"{scene.stem}-{'tiled' if extra else 'whole'}.json"
-    command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", *extra]
+    profile = output.with_suffix(".profile.json")
+    command = [*CYLX, "extract", scene, "-o", output, "--overwrite", "--quiet", "--no-annotate", "--profile", profile]
+    command += extra
     code, seconds, busy, peak = watched(command)
     row = {"code": code, "seconds": seconds, "busy": busy, "peak": peak, "result": str(output)}
     if code == 0:
@@ -190,6 +193,7 @@ def run_of(scene, folder, extra):
         tiles = result.get("tiles", {"count": 1, "joined": 0})
         row |= {"points": truth["points"], "f1": evaluate(truth, result).f1, "pipes": len(truth["cylinders"])}
         row |= {"tiles": tiles["count"], "joined": tiles["joined"]}
+        row["stages"] = json.loads(profile.read_text(encoding="utf-8"))["inputs"][0]["stages"]
     return row
 
 
@@ -218,12 +222,16 @@ def draw(kept, folder):
     for number, name in enumerate(("in tiles", WHOLE)):
         rows = [row for key, row in kept.items() if not row["code"] and key.endswith(f" {WHOLE}") == (name == WHOLE)]
         rows.sort(key=lambda row: row["points"])
+        projected = [row for row in rows if row.get("projected")]
+        rows = [row for row in rows if row not in projected]
         if not rows:
             continue
         points = [row["points"] for row in rows]
         told = f"{name}, slope {slope_of(rows):.2f}" if len(rows) > 1 else name
         left.plot(points, [row["busy"] for row in rows], "o-", color=COLORS[number], label=told)
         right.plot(points, [row["peak"] for row in rows], "o-", color=COLORS[number], label=name)
+        for row in projected:
+            left.plot(row["points"], row["busy"], "o", color=COLORS[number], fillstyle="none", label="projected")
     left.set_ylabel("seconds of processors")
     right.set_ylabel("peak memory of all processes, MB")
     for axis in (left, right):

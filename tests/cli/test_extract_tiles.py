@@ -149,8 +149,7 @@ def test_a_scan_that_does_not_fit_is_cut_and_told_of(run_cylx, folder, monkeypat
     [
         (["--tile", "0"], "'0' is neither a length nor auto"),
         (["--tile", "auto", "--memory", "much"], "'much' is no memory such as 4GB"),
-        (["--tile", "2", "--runs"], "--runs: does not work with tiles; leave it out"),
-        (["--tile", "2", "--voxel", "0.1"], "--voxel: does not work with tiles; leave it out"),
+        (["--tile", "2", "--runs"], "--runs: does not work with tiles; leave it out, and join what was found by: cylx"),
         (["--tile", "2", "--annotated", "a.pcd"], "--annotated a.pcd: does not work with tiles; choose a name in .ply"),
         (["--tile", "2", "--method", "msac"], "method: msac does not work in tiles; use gt"),
         (["--tile", "2", "--memory", "100MB"], "--memory: 0.1 GB are too little; give at least 0.77 GB"),

@@ -1,5 +1,7 @@
 """Arcs between planes: fitted with the planes that touch them; and what lies beyond them is not of the arc."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from cylx.records import IndexedCloud, Noise, Segment
 from cylx.scene import make_frame
 from cylx.segments.refitting import refit
 from cylx.stages.arcs import arcs_of
+from cylx.stages.verification import may_be_arc, verify
 
 SIGMA, LENGTH, HALF = 0.02, 2.0, 2.0
 """Noise, length of the planes and half the height of the arc; its radius is 1."""
@@ -98,3 +101,26 @@ def test_the_axis_is_that_of_the_planes_though_the_segment_leans(tilt_deg):
 def test_without_a_refit_there_are_only_arcs_with_planes():
     indexed, segment, _ = in_frame(pipe())
     assert arcs_of(segment, indexed, None) == []
+
+
+def beam(count=6000, seed=0):
+    """Draw one side of an I-beam about the z axis: two flanges that face each other, and the web between them."""
+    rng = np.random.default_rng(seed)
+    along, part = rng.uniform(-1, 1, count), rng.integers(3, size=count)
+    sides = np.choose(part, [-1.0, 1.0, along])
+    depth = np.where(part < 2, along, -0.2)
+    points = np.column_stack([depth, sides, rng.uniform(-HALF, HALF, count)])
+    return points + SIGMA * rng.standard_normal(points.shape)
+
+
+@pytest.mark.parametrize(
+    ("points", "turn_deg", "seen"),
+    [(rounded_edge(90.0)[0], 90.0, True), (rounded_edge(170.0)[0], 170.0, True), (beam(), 180.0, False)],
+    ids=["edge", "end of a slot", "beam"],
+)
+def test_an_arc_is_seen_between_its_planes(points, turn_deg, seen):
+    indexed, segment, _ = in_frame(points)
+    arc = replace(segment, wedge=np.array([1.0, 0.0, 0.0, np.cos(0.5 * np.radians(turn_deg))]))
+    verdict = verify(arc, indexed, 0.8, (40, 42), Config().verification, arc=True)
+    assert verdict.measures["tangent"] > 0.25
+    assert may_be_arc(verdict) == seen

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cylx.records import Finding
+from cylx.segments.refitting import refit
 from cylx.stages.parting import parted
 from tests.evidence.test_ends import STEP, findings_of, piece, ragged
 
@@ -69,3 +70,39 @@ def test_if_a_piece_is_no_cylinder_the_whole_stays():
     indexed, whole, _ = plated(piece(0, 3), piece(4, 7, seed=1))
     refused = iter([None, whole])
     assert parted(whole, indexed, lambda segment, best: next(refused)) == [whole]
+
+
+def in_line(radius, strip_deg=40.0, gap=9.0):
+    """Give two pipes of 3 and of `radius` 2.4 in line, with what touches them in the gap, and one finding of all."""
+    other = piece(3 + gap, 5.4 + gap, seed=1)
+    other[:, :2] *= radius
+    low = 3 + 0.3 * gap, 3 + 0.9 * gap
+    strips = [piece(z, z + 0.2, strip_deg, seed=k, step=0.03) for k, z in enumerate(low)]
+    pieces = [piece(0, 3), *strips, other]
+    indexed, _, unit = findings_of(*pieces, plates=False, sigma=0.03)
+    _, whole, _ = plated(*pieces, plates=False)
+    return indexed, whole, unit
+
+
+@pytest.mark.parametrize(
+    ("how", "error", "lengths"),
+    [
+        ({"radius": 1.05}, 0.003, [2.4, 3]),
+        ({"radius": 1.0}, 0.003, [14.4]),
+        ({"radius": 1.05, "gap": 2.9}, 0.003, [8.3]),
+        ({"radius": 1.05}, 0.02, [14.4]),
+        ({"radius": 1.05, "strip_deg": 360.0}, 0.003, [14.4]),
+    ],
+    ids=["of two sizes", "of one size", "near", "as far as is known", "with pieces between"],
+)
+def test_pipes_that_lie_in_line_by_chance_are_two_if_their_sizes_differ(how, error, lengths):
+    indexed, whole, unit = in_line(**how)
+
+    def judge(segment, best):
+        fitted = refit(segment, indexed)
+        return Finding(fitted, best.points, 10, 0.8, 0.9, best.coverage, error * unit, 0.001)
+
+    found = parted(whole, indexed, judge)
+    assert heights(found, unit) == pytest.approx(lengths, abs=0.1)
+    if len(found) > 1:
+        assert sorted(one.segment.radius / unit for one in found) == pytest.approx([1.0, how["radius"]], abs=0.01)

@@ -59,13 +59,14 @@ def truth(*cylinders):
 
 
 @contextmanager
-def outcome_of(points, folder, *, size=None, buffer=None, config=None, runner=None, rejected=False):
+def outcome_of(points, folder, *, size=None, buffer=None, config=None, runner=None, rejected=False, selection=None):
     """Extract a cloud in tiles of a size, and yield the outcome, while the scratch folder is there."""
     options = tiled.Options(size, buffer, 2e9, 1, rejected)
     with open_scratch(folder, "result", {}, resume=False) as scratch:
         clouds = [stream_arrays([points], scratch.path("spool"))]
+        config, runner = config or Config(), runner or Here()
         yield tiled.extract_in_tiles(
-            clouds, Selection(), config or Config(), options, scratch, runner or Here(), SilentObserver()
+            clouds, selection or Selection(), config, options, scratch, runner, SilentObserver()
         )
 
 

@@ -77,7 +77,7 @@ class Run:
 
         if needs_tiles(job.scan, self.tiles):
             if not self.tiles.certain:
-                check_tiles([job], self.settings, self.selection, runs=self.runs)
+                check_tiles([job], self.settings, runs=self.runs)
                 self.messages.say(why_tiles(job.scan, self.tiles))
             how = TiledRun(
                 self.settings,

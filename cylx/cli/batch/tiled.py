@@ -59,26 +59,21 @@ def why_tiles(scan: str, tiles: TileOptions) -> str:
     return f"{needed:.2g} GB would be needed and {available:.2g} GB are there: the scan is cut into tiles"
 
 
-def check_tiles(jobs: Sequence[Job], settings: Config, selection: Selection, *, runs: bool = False) -> None:
+def check_tiles(jobs: Sequence[Job], settings: Config, *, runs: bool = False) -> None:
     """Refuse what cannot be had from tiles, before anything is computed.
 
     Raises
     ------
     UsageError
-        If an output needs all points at once, or the selection does.
+        If an output needs all points at once.
     ConfigError
         If the configuration gives nothing that could be joined.
     """
     from cylx.tiles.run import check_method
 
-    remedy = "leave it out, or leave --tile out"
-    wanted = {
-        "--voxel": selection.voxel is not None,
-        "--runs": runs,
-    }
-    for option, given in wanted.items():
-        if given:
-            raise UsageError(option, "does not work with tiles", remedy)
+    if runs:
+        remedy = "leave it out, and join what was found by: cylx runs RESULT SCAN, or without SCAN by the axes alone"
+        raise UsageError("--runs", "does not work with tiles", remedy)
     for job in jobs:
         if job.annotated is not None and not job.annotated.lower().endswith((".ply", ".las", ".laz")):
             raise UsageError(f"--annotated {job.annotated}", "does not work with tiles", "choose a name in .ply")
