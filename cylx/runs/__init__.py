@@ -18,6 +18,7 @@ from cylx.runs.chains import settle_chains
 from cylx.runs.crossings import split_crossings
 from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
+from cylx.runs.jogs import split_jogs
 from cylx.runs.onward import follow_ends
 from cylx.runs.parts import drop_parts, drop_turned, drop_twins
 from cylx.runs.pieces import settled
@@ -65,7 +66,7 @@ def trace_runs(
     """
     near = Surroundings(points, labels, spacing, noise)
     pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
-    pipes = split_crossings(settled(pipes, near), near)
+    pipes = split_jogs(split_crossings(settled(pipes, near), near), near)
     others = rough_ones(pipes, near) | {k for k, pipe in enumerate(pipes) if pipe.is_other}
     trace = Trace(pipes, near, others=others)
     add_bends(trace, near, furthest=DOUBTED_TURN)

@@ -26,7 +26,7 @@ MOST_INSIDE = 0.5
 FURTHEST_TURN = math.radians(100.0)
 """What turns by more may be two elbows in one plane, hardly apart: it is one if its surface is that of a torus."""
 DOUBTED_TURN = math.radians(50.0)
-"""Two elbows in one plane with a short pipe between turn by more; what may be two is looked at so, as long as it may."""
+"""Two elbows in one plane with a short pipe between turn by more: while others may be found, one is clearly a torus."""
 MOST_DEVIATION, LEAST_IN_CELL, LEAST_CELLS = 0.015, 4, 8
 """By how many radii pieces of the surface of an elbow deviate at most, in the mean; points of a piece; pieces."""
 BESIDE = 0.3
