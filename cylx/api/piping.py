@@ -25,6 +25,11 @@ if TYPE_CHECKING:
 
 Found = TypeVar("Found", Extraction, Result)
 
+ENOUGH = 0.05
+"""Share of the points of a cylinder that a cloud has at least, also a thinned one, if it is that of the result."""
+MOST_ASKED = 20_000
+"""Points of an annotated cloud that are asked whether their cylinders are those of the result."""
+
 
 def find_runs(
     found: Found, cloud: PointCloud | ArrayLike | None = None, *, fit: bool = False, observer: Observer | None = None
@@ -99,7 +104,7 @@ def _result_with_runs(result: Result, cloud: PointCloud | None, *, fit: bool) ->
     extraction = extraction_of(result, PointCloud(np.empty((0, 3))) if cloud is None else cloud)
     traced = _with_runs(extraction, fit=fit)
     new = Result.lists_of(traced.cylinders, traced.piping)
-    return result.model_copy(update=new)
+    return result.model_copy(update=new | {"warnings": list(traced.warnings)})
 
 
 def extraction_of(result: Result, cloud: PointCloud) -> Extraction:
@@ -116,7 +121,36 @@ def extraction_of(result: Result, cloud: PointCloud) -> Extraction:
     blends = None if result.blends is None else tuple(one.to_fit() for one in result.blends)
     config = Config.model_validate(result.config, strict=False)
     residuals = np.full(len(labels), np.nan, np.float32)
-    return Extraction(fits, labels, residuals, cloud, scene, (), config, tuple(result.warnings), blends=blends)
+    warnings = tuple(dict.fromkeys([*result.warnings, *_doubts(fits, labels)]))
+    return Extraction(fits, labels, residuals, cloud, scene, (), config, warnings, blends=blends)
+
+
+def _are_theirs(ids: NDArray[np.generic], fits: Sequence[CylinderFit], points: NDArray[np.float64]) -> bool:
+    """Return whether most points lie about the cylinder they are said to be of; otherwise another result said it."""
+    there = np.flatnonzero(ids >= 0)
+    there = there[:: max(1, len(there) // MOST_ASKED)]
+    near = 0
+    for index in np.unique(ids[there]):
+        shape = fits[int(index)].cylinder
+        away = points[there[ids[there] == index]] - shape.point
+        along = away @ shape.direction
+        across = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - along**2, 0.0))
+        near += int((np.abs(across - shape.radius) < 0.5 * shape.radius).sum())
+    return 2 * near >= len(there)
+
+
+def _doubts(fits: Sequence[CylinderFit], labels: NDArray[np.int32]) -> list[str]:
+    """Return the warning that most cylinders have hardly any of their points in a cloud, if that is so."""
+    if not len(labels):
+        return []
+    there = np.bincount(labels[labels >= 0], minlength=len(fits))
+    without = sum(int(count < ENOUGH * fit.inliers) for count, fit in zip(there, fits, strict=True))
+    if without <= 0.5 * len(fits):
+        return []
+    return [
+        f"{without} of {len(fits)} cylinders have hardly any points in the cloud; "
+        "check that it is the one of the result, in the same unit and place"
+    ]
 
 
 def _labels_of(cloud: PointCloud, fits: Sequence[CylinderFit], scene: Scene) -> NDArray[np.int32]:
@@ -124,7 +158,7 @@ def _labels_of(cloud: PointCloud, fits: Sequence[CylinderFit], scene: Scene) -> 
     table = cloud.table
     if table is not None and "cylinder_id" in (table.dtype.names or ()):
         ids = np.asarray(table["cylinder_id"][slice(None) if cloud.valid is None else cloud.valid])
-        if ids.max(initial=-1) < len(fits):
+        if ids.max(initial=-1) < len(fits) and _are_theirs(ids, fits, cloud.points):
             return np.asarray(ids, dtype=np.int32)
     return nearest_cylinders(fits, cloud.points, scene.spacing, scene.noise)
 

@@ -123,7 +123,8 @@ def _found(content: Result, cloud: PointCloud | None, *, fit: bool) -> tuple[Res
     if cloud is None:
         return find_runs(content, fit=fit), None
     extraction = find_runs(extraction_of(content, cloud), fit=fit)
-    return content.model_copy(update=content.lists_of(extraction.cylinders, extraction.piping)), extraction
+    lists = content.lists_of(extraction.cylinders, extraction.piping)
+    return content.model_copy(update=lists | {"warnings": list(extraction.warnings)}), extraction
 
 
 def _write(
@@ -159,6 +160,8 @@ def _show(path: str, content: Result, outputs: list[str]) -> None:
     written = ", ".join(printable(name) for name in outputs if name != STREAM)
     said = piping_counted(len(content.runs or ()), [one.kind for one in content.fittings or ()])
     tell(f"{printable(path)}: {said}" + (f", written to {written}" if written else ""))
+    for warning in content.warnings:
+        tell(f"warning: {warning}")
     if content.adjustments:
         applied = sum(one.applied for one in content.adjustments)
         tell(f"{applied} constraints applied, {len(content.adjustments) - applied} refused; see 'adjustments'")

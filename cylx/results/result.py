@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, ValidationError, field_validator
+from pydantic import ConfigDict, Field, JsonValue, ValidationError, field_validator, model_validator
 
 from cylx.config import describe_fault
 from cylx.config.choices import Method
@@ -20,6 +20,7 @@ from cylx.errors import InputError
 from cylx.results.cylinders import ResultBlend, ResultCylinder
 from cylx.results.fittings import AnyFitting, ResultAdjustment, ResultRun, fitting_of
 from cylx.results.parts import Count, Input, Length, Part, drop_missing, text_of
+from cylx.results.references import unknown_reference
 from cylx.results.table import dataframe_of
 from cylx.version import __version__
 from cylx.wording import counted
@@ -116,6 +117,13 @@ class Result(Part):
         if not _is_finite(config):
             raise ValueError("holds a number that is not finite; give the file as cylx wrote it")
         return config
+
+    @model_validator(mode="after")
+    def _check_references(self) -> Result:
+        unknown = unknown_reference(self.cylinders, self.fittings or (), self.runs or ())
+        if unknown is not None:
+            raise ValueError(f"{unknown}; give the file as cylx wrote it")
+        return self
 
     @classmethod
     def of(cls, extraction: Extraction | TiledExtraction) -> Result:

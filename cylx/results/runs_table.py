@@ -24,7 +24,7 @@ def runs_rows(result: Result, most: int = MOST_ROWS) -> list[list[str]]:
     most : int
         Maximum number of rows.
     """
-    kinds = [one.kind for one in result.fittings or ()]
+    kinds = {one.id: one.kind for one in result.fittings or ()}
     rows = []
     for run in result.runs or ():
         if not run.fittings:

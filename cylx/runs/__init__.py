@@ -13,10 +13,12 @@ from cylx.records import CylinderFit
 from cylx.runs.adding import add_caps, add_collars, add_gaps, add_junctions, add_reducers
 from cylx.runs.answer import Traced, answer_of, in_order
 from cylx.runs.assumed import add_assumed
+from cylx.runs.bend_evidence import DOUBTED_TURN
 from cylx.runs.chains import settle_chains
 from cylx.runs.crossings import split_crossings
 from cylx.runs.elbows import add_bends, trim
 from cylx.runs.graph import find_runs
+from cylx.runs.jogs import split_jogs
 from cylx.runs.onward import follow_ends
 from cylx.runs.parts import drop_parts, drop_turned, drop_twins
 from cylx.runs.pieces import settled
@@ -64,16 +66,16 @@ def trace_runs(
     """
     near = Surroundings(points, labels, spacing, noise)
     pipes = [Pipe.of(i, fit, near.origin, noise) for i, fit in enumerate(fits)]
-    pipes = split_crossings(settled(pipes, near), near)
+    pipes = split_jogs(split_crossings(settled(pipes, near), near), near)
     others = rough_ones(pipes, near) | {k for k, pipe in enumerate(pipes) if pipe.is_other}
     trace = Trace(pipes, near, others=others)
-    add_bends(trace, near)
+    add_bends(trace, near, furthest=DOUBTED_TURN)
     add_reducers(trace, near)
     for _ in range(ROUNDS):
         # straights that were found too long have bent with their fittings; those found along the runs are new
         trace = drop_twins(trace)
         trace = Trace(trim(trace, near), near, others=trace.others, followed=trace.followed)
-        add_bends(trace, near)
+        add_bends(trace, near, furthest=DOUBTED_TURN)
         add_reducers(trace, near)
         add_junctions(trace, near)
         if not follow_ends(trace, near):
@@ -82,6 +84,8 @@ def trace_runs(
             pass
     else:
         add_junctions(trace, near)
+    # what may be two elbows, but was not found as two
+    add_bends(trace, near)
     add_collars(trace, near)
     add_gaps(trace, near)
     add_caps(trace, near)

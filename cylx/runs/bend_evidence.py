@@ -25,6 +25,8 @@ MOST_INSIDE = 0.5
 """Points inside the tube, or just beside its surface, for each point on it."""
 FURTHEST_TURN = math.radians(100.0)
 """What turns by more may be two elbows in one plane, hardly apart: it is one if its surface is that of a torus."""
+DOUBTED_TURN = math.radians(50.0)
+"""Two elbows in one plane with a short pipe between turn by more: while others may be found, one is clearly a torus."""
 MOST_DEVIATION, LEAST_IN_CELL, LEAST_CELLS = 0.015, 4, 8
 """By how many radii pieces of the surface of an elbow deviate at most, in the mean; points of a piece; pieces."""
 BESIDE = 0.3
@@ -80,10 +82,12 @@ def judged(
     near: Surroundings,
     spread: float,
     least: float = 0.0,
+    furthest: float = FURTHEST_TURN,
 ) -> FittedBend | None:
     """Return a fitted bend with its evidence; None if the points do not show it.
 
-    If its arc is shorter than `least` radii, points of its pipes tell it as well, so far about its middle.
+    If its arc is shorter than `least` radii, points of its pipes tell it as well, so far about its middle. If it turns
+    by more than `furthest`, in radians, its surface is that of a torus.
     """
     bend, radius = solved.bend, solved.radius
     if bend.bend_radius > 1.1 * WIDEST_BEND * radius:
@@ -112,7 +116,7 @@ def judged(
     if not one_bend or lengthwise < LEAST_LENGTHWISE or rms > ROUGH * math.hypot(spread, 0.005 * radius):
         return None
     about = own | beside
-    if bend.angle > FURTHEST_TURN and _deviates(bend, radius, near.points[indices[about]], rows[about], errors[about]):
+    if bend.angle > furthest and _deviates(bend, radius, near.points[indices[about]], rows[about], errors[about]):
         return None
     coverage = _covered(bend, near.points[indices[own]], rows[own]) / (12.0 * pieces)
     of_bend = own & (along > -corner) & (along < bend.length + corner)

@@ -10,7 +10,7 @@ import numpy as np
 
 from cylx.geometry.arrays import FloatArray, IndexArray
 from cylx.runs.bend import Bend
-from cylx.runs.bend_evidence import LEAST_INLIERS, WIDEST_BEND, FittedBend, judged
+from cylx.runs.bend_evidence import FURTHEST_TURN, LEAST_INLIERS, WIDEST_BEND, FittedBend, judged
 from cylx.runs.bend_fit import refined
 from cylx.runs.meetings import Meeting
 from cylx.runs.pipes import ON_SURFACE, Pipe, Surroundings
@@ -32,7 +32,9 @@ SHARPEST = math.radians(100.0)
 """Mitres of a greater angle are none."""
 
 
-def fit_meeting(meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings) -> FittedBend | None:
+def fit_meeting(
+    meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings, furthest: float = FURTHEST_TURN
+) -> FittedBend | None:
     """Fit the bend of two ends to the points about it; None if it does not fit.
 
     Parameters
@@ -41,6 +43,8 @@ def fit_meeting(meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings) -> 
     pipes : sequence of Pipe
         Those it is of.
     near : Surroundings
+    furthest : float
+        If it turns by more, in radians, its surface is that of a torus.
 
     Returns
     -------
@@ -72,7 +76,7 @@ def fit_meeting(meeting: Meeting, pipes: Sequence[Pipe], near: Surroundings) -> 
     about = points[np.abs(distances - radius) < max(0.3 * radius, 2.0 * ON_SURFACE * spread)]
     says = SAY * one.length if is_loose(one) else 0.0, SAY * two.length if is_loose(two) else 0.0
     solved = refined(bend, one, two, radius, about, spread, says=says)
-    found = judged(meeting.pipes, meeting.ends, solved, indices, near, spread, SHORTEST)
+    found = judged(meeting.pipes, meeting.ends, solved, indices, near, spread, SHORTEST, furthest)
     return None if found is None or _is_across(found, one, two, near) else found
 
 

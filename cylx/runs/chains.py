@@ -22,6 +22,8 @@ LOOSE_OFFSET, LOOSE_TILT = 1.0, 0.5
 """What is known of a short pipe without its points: standard deviations, in radii and radians."""
 LEAST_KEPT = 0.9
 """A fit of all that leaves an elbow a smaller share of its points is none."""
+SHARES = (1.0, 0.99, 0.97, 0.94, 0.9)
+"""Shares of what a fit of all changes that are tried: the first that leaves something between the elbows."""
 MOST_MOVED, MOST_TURNED = 3.0, math.radians(15.0)
 """Nor is one that moves the ends of an elbow by so many radii, or turns it by so much."""
 
@@ -40,8 +42,22 @@ def settle_chains(trace: Trace, near: Surroundings) -> None:
     for pipes, elbows in chains_of(trace):
         chain = gathered(trace, near, pipes, elbows)
         solved = _solved(chain)
-        if solved is not None:
-            _settle(trace, near, chain, *solved)
+        if solved is None:
+            continue
+        before, (state, covariance) = _before(chain), solved
+        # a fit that lets elbows overlap that meet at a weld goes a little too far
+        for share in SHARES:
+            if _settle(trace, near, chain, before + share * (state - before), covariance):
+                break
+
+
+def _before(chain: Chain) -> FloatArray:
+    """Return the unknowns of a chain before its fit: of each pipe no change, the radius, the bend radii."""
+    base = np.zeros(4 * len(chain.pipes) + 1 + len(chain.bends))
+    base[4 * len(chain.pipes)] = chain.radius
+    for k, place in chain.bends.items():
+        base[place] = chain.elbows[k].bend_radius
+    return base
 
 
 def _bends(chain: Chain, pipes: Mapping[int, Pipe], state: FloatArray) -> dict[int, Bend]:
@@ -56,7 +72,7 @@ def _solved(chain: Chain) -> tuple[FloatArray, FloatArray] | None:
     """Return the unknowns of a chain after its fit, and their covariance; None if that fails."""
     count = 4 * len(chain.pipes) + 1 + len(chain.bends)
     tube, radius, spread = 4 * len(chain.pipes), chain.radius, chain.spread
-    information, base = np.zeros((count, count)), np.zeros(count)
+    information, base = np.zeros((count, count)), _before(chain)
     certain = 0.0
     for index, first in chain.place.items():
         pipe = chain.pipes[index]
@@ -67,9 +83,7 @@ def _solved(chain: Chain) -> tuple[FloatArray, FloatArray] | None:
             certain += 1.0 / max(float(pipe.covariance[4, 4]), 1e-300)
         information[first : first + 4, first : first + 4] = np.linalg.inv(known)
     information[tube, tube] = 1.0 / (1.0 / max(certain, 1e-3 / radius**2) + (0.01 * radius) ** 2)
-    base[tube] = radius
-    for k, place in chain.bends.items():
-        base[place] = chain.elbows[k].bend_radius
+    for place in chain.bends.values():
         information[place, place] = 1e-9 / radius**2
     small = np.full(count, 1e-4 * radius)
     for first in chain.place.values():
@@ -176,8 +190,8 @@ def _is_near(chain: Chain, k: int, bend: Bend) -> bool:
     return max(moves) < most and turn < MOST_TURNED and bend.angle > LEAST_TURN
 
 
-def _settle(trace: Trace, near: Surroundings, chain: Chain, state: FloatArray, covariance: FloatArray) -> None:
-    """Move the pipes and elbows of a chain to where its fit has them, unless elbows lose their points."""
+def _settle(trace: Trace, near: Surroundings, chain: Chain, state: FloatArray, covariance: FloatArray) -> bool:
+    """Move the pipes and elbows of a chain to where its fit has them, unless elbows lose their points or overlap."""
     radius = float(state[4 * len(chain.pipes)])
     width = ON_SURFACE * chain.spread + 0.01 * radius
     moved: dict[int, Pipe] = {}
@@ -197,10 +211,10 @@ def _settle(trace: Trace, near: Surroundings, chain: Chain, state: FloatArray, c
         then = (before > 0) & (before < chain.elbows[k].bend_radius * chain.elbows[k].angle)
         then &= np.abs(around - chain.elbows[k].radius) < width
         if now.sum() < LEAST_KEPT * then.sum() or not _is_near(chain, k, bend):
-            return
+            return False
     ends = {index: _ended(chain, index, pipe, bends) for index, pipe in moved.items()}
     if any(float(pipe.direction @ chain.pipes[index].direction) < 0.0 for index, pipe in ends.items()):
-        return
+        return False
     for index, pipe in ends.items():
         trace.pipes[index] = pipe
     for k, bend in bends.items():
@@ -216,6 +230,7 @@ def _settle(trace: Trace, near: Surroundings, chain: Chain, state: FloatArray, c
             end=bend.end,
             std=_deviations(chain, k, state, covariance),
         )
+    return True
 
 
 def _deviations(chain: Chain, k: int, state: FloatArray, covariance: FloatArray) -> dict[str, float]:

@@ -9,7 +9,7 @@ import numpy as np
 from cylx.geometry.arrays import FloatArray
 from cylx.geometry.cylinder import canonical_direction
 from cylx.records import Elbow
-from cylx.runs.bend_evidence import FittedBend
+from cylx.runs.bend_evidence import FURTHEST_TURN, FittedBend
 from cylx.runs.bend_fit import bend_of
 from cylx.runs.bending import NEARBY, fit_meeting, gap_before, is_loose
 from cylx.runs.meetings import Meeting, meetings
@@ -26,11 +26,16 @@ BETTER = 0.8
 """An axis moves with a fit that leaves it less than this share of its deviations."""
 
 
-def add_bends(trace: Trace, near: Surroundings, only: frozenset[int] | None = None) -> int:
-    """Add the elbows between pipes whose axes meet, or `only` those of some pipes; return their number."""
+def add_bends(
+    trace: Trace, near: Surroundings, only: frozenset[int] | None = None, furthest: float = FURTHEST_TURN
+) -> int:
+    """Add the elbows between pipes whose axes meet, or `only` those of some pipes; return their number.
+
+    Those that turn by more than `furthest`, in radians, are added only if they are clearly one and not two.
+    """
     tried = []
     for meeting in meetings(trace.pipes, trace.closed, only):
-        fitted = fit_meeting(meeting, [trace.pipes[i] for i in meeting.pipes], near)
+        fitted = fit_meeting(meeting, [trace.pipes[i] for i in meeting.pipes], near, furthest)
         if fitted is not None:
             gap = gap_before(fitted, trace.pipes) / fitted.radius
             tried.append(((gap > NEARBY, -fitted.lengthwise, -len(fitted.indices), meeting.pipes), meeting, fitted))

@@ -144,3 +144,39 @@ def test_tiles_and_runs_exclude_each_other(run_cylx, plant):
     failed = run_cylx("extract", plant / "plant.xyz", "--runs", "--tile", "1")
     assert failed.exit_code == 2
     assert "--runs: does not work with tiles" in failed.stderr
+
+
+def test_a_cloud_of_another_place_is_told(run_cylx, plant, tmp_path):
+    moved, out = tmp_path / "moved.xyz", tmp_path / "out.json"
+    np.savetxt(moved, np.loadtxt(plant / "plant.xyz") + 5.0, fmt="%.6f")
+    done = run_cylx("runs", plant / "plant.cylinders.json", moved, "-o", out)
+    (said,) = json.loads(out.read_text())["warnings"]
+    assert said.startswith("2 of 2 cylinders have hardly any points in the cloud; ")
+    assert f"warning: {said}" in done.stderr
+    right = run_cylx("runs", plant / "plant.cylinders.json", plant / "plant.xyz", "-o", "-")
+    assert json.loads(right.stdout)["warnings"] == []
+
+
+def test_the_labels_of_another_result_are_not_taken(run_cylx, plant, tmp_path):
+    clouds, out = [tmp_path / f"{name}.ply" for name in "ab"], tmp_path / "out.json"
+    document = json.loads((plant / "plant.cylinders.json").read_text())
+    first, second = document["cylinders"]
+    document["cylinders"] = [dict(second, id=0), dict(first, id=1)]
+    (tmp_path / "other.json").write_text(json.dumps(document))
+    for cloud, result in zip(clouds, (plant / "plant.cylinders.json", tmp_path / "other.json"), strict=True):
+        run_cylx("runs", result, plant / "plant.xyz", "-o", out, "--overwrite", "--annotated", cloud)
+    answers = [run_cylx("runs", plant / "plant.cylinders.json", cloud, "-o", "-").stdout for cloud in clouds]
+    inliers = [[one["inliers"] for one in json.loads(answer)["cylinders"]] for answer in answers]
+    assert inliers[0] == pytest.approx(inliers[1], rel=0.02)
+    assert min(inliers[0]) > 0
+
+
+def test_what_is_not_there_cannot_be_joined(run_cylx, plant, tmp_path):
+    out = tmp_path / "out.json"
+    run_cylx("runs", plant / "plant.cylinders.json", plant / "plant.xyz", "-o", out)
+    document = json.loads(out.read_text())
+    document["cylinders"].pop()
+    out.write_text(json.dumps(document))
+    failed = run_cylx("runs", out, "--table")
+    assert failed.exit_code == 3
+    assert "joins cylinder 1, which is not there" in failed.stderr

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from cylx.errors import InputError
+from cylx.geometry.cylinder import Cylinder
 from cylx.records import (
     Cap,
     Cross,
+    CylinderFit,
     Elbow,
     Flange,
     Inline,
@@ -21,7 +23,7 @@ from cylx.records import (
     PipeSize,
     Reducer,
 )
-from cylx.results import Result, result_schema
+from cylx.results import Result, ResultCylinder, result_schema
 from cylx.results.fittings import ResultRun, fitting_of
 
 PLACE, UP = np.array([1.0, -0.0, 2.0]), np.array([0.0, 0.0, 1.0])
@@ -57,7 +59,10 @@ RUN = PipeRun(
 
 
 def written():
-    """Give a result that has nothing but one fitting of each kind, and a run."""
+    """Give a result of four cylinders, one fitting of each kind, and a run."""
+    pipe = CylinderFit(
+        Cylinder((0, 0, 0), (0, 0, 1), 0.1, 2.0), inliers=9, rmse=0.1, coverage=3.0, support=1, payoff=0.5
+    )
     return {
         "schema": "cylx.cylinders/1",
         "cylx_version": "0",
@@ -66,7 +71,7 @@ def written():
         "config": {},
         "scene": {"spacing": 1.0, "noise": 0.1},
         "stages": [],
-        "cylinders": [],
+        "cylinders": [ResultCylinder.of(i, pipe).to_object() for i in range(4)],
         "fittings": [fitting_of(i, one).to_object() for i, one in enumerate(FITTINGS)],
         "runs": [ResultRun.of(0, RUN).to_object()],
         "warnings": [],
@@ -108,3 +113,16 @@ def test_what_is_no_fitting_is_refused(change, place):
     document["fittings"][0] |= change
     with pytest.raises(InputError, match=place):
         Result.parse(document, "it")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"cylinders": []}, "fitting 0 joins cylinder 3, which is not there"),
+        ({"fittings": []}, "run 0 has fitting 0, which is not there"),
+        ({"fittings": [], "cylinders": []}, "run 0 has cylinder 3, which is not there"),
+    ],
+)
+def test_what_refers_to_what_is_not_there_is_refused(change, said):
+    with pytest.raises(InputError, match=said):
+        Result.parse(written() | change, "it")
