@@ -23,6 +23,7 @@ from cylx.version import __version__
         "config": "cylx.cli.config",
         "synth": "cylx.cli.synth",
         "evaluate": "cylx.cli.evaluate",
+        "check": "cylx.cli.check",
         "diff": "cylx.cli.diff",
         "deviation": "cylx.cli.deviation",
         "export": "cylx.cli.export",

@@ -13,7 +13,9 @@ from cylx.geometry.kernels import njit
 def box_of(points: FloatArray) -> FloatArray:
     """Return the least and the greatest coordinates, shape (2, 3)."""
     box = np.empty((2, 3))
-    _fill_box(points, box)
+    fixed = points.view()
+    fixed.flags.writeable = False  # those of a cloud are: one kind of array, and one kernel
+    _fill_box(fixed, box)
     return box
 
 

@@ -96,12 +96,19 @@ def fill_circle(
 
 @njit(cache=True, nogil=True)
 def _closest(x: FloatArray, y: FloatArray, n: int, k: int) -> float:
-    """Return the square of the distance of the k-th closest point to zero."""
-    squares = np.empty(n)
+    """Return the square of the distance of the k-th closest point to zero, of the last one if there are fewer."""
+    nearest, m = np.empty(k), 0
     for a in range(n):
-        squares[a] = x[a] * x[a] + y[a] * y[a]
-    squares.sort()
-    return float(squares[min(k, n) - 1])
+        square = x[a] * x[a] + y[a] * y[a]
+        if m == k and square >= nearest[k - 1]:
+            continue
+        b = min(m, k - 1)
+        while b > 0 and nearest[b - 1] > square:
+            nearest[b] = nearest[b - 1]
+            b -= 1
+        nearest[b] = square
+        m = min(m + 1, k)
+    return float(nearest[m - 1])
 
 
 @njit(cache=True, nogil=True)
@@ -148,19 +155,22 @@ def _fill_row(
     row: FloatArray,
 ) -> bool:
     """Fill in a circle if enough points lie on it, over enough of its turn, and few beside it."""
-    filled = np.zeros(SECTORS, np.bool_)
+    mask, sectors = 0, 0
     on, beside, low, high, total = 0, 0, math.inf, -math.inf, 0.0
     for a in range(n):
         dx, dy = x[a] - cx, y[a] - cy
         away = abs(math.sqrt(dx * dx + dy * dy) - radius)
         if away < tolerance:
             on += 1
-            filled[int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * SECTORS) % SECTORS] = True
+            mask |= 1 << (int((math.atan2(dy, dx) / (2.0 * math.pi) + 0.5) * SECTORS) % SECTORS)
             low, high = min(low, z[a]), max(high, z[a])
             total += z[a]
         elif away < 3.0 * tolerance:
             beside += 1
-    if on < LEAST_ON or filled.sum() < LEAST_SECTORS or 2.0 * on < LEAST_CONTRAST * beside:
+    while mask:
+        sectors += mask & 1
+        mask >>= 1
+    if on < LEAST_ON or sectors < LEAST_SECTORS or 2.0 * on < LEAST_CONTRAST * beside:
         return False
     row[0], row[1], row[2], row[3], row[4], row[5] = cx, cy, radius, total / on, 0.5 * (high - low), on
     return True

@@ -119,6 +119,9 @@ _InTree: Any = next(
 )  # numba 0.60 has the _
 
 
+_UserWide: Any = next(one for one in _LOCATORS if one.__name__.lstrip("_") == "UserWideCacheLocator")
+
+
 class _AnyTree(_InTree):  # type: ignore[misc]  # Numba has no types
     """The folder of the source, even if it cannot be written to: an administrator may have filled it."""
 
@@ -145,7 +148,11 @@ class KernelCache(FunctionCache):  # type: ignore[misc]  # Numba has no types
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         super().__init__(function)
-        self._cache_file = _Files(Path(self.cache_path), self._impl.filename_base, _stamp(function, options, self))
+        # what was compiled with the installation serves also those who may write in their own folder only
+        beside = Path(function.__code__.co_filename).parent / "__pycache__"
+        shared = beside if isinstance(self._impl.locator, _UserWide) else None
+        name, stamp = self._impl.filename_base, _stamp(function, options, self)
+        self._cache_file = _Files(Path(self.cache_path), name, stamp, shared)
 
     @property
     def stamp(self) -> bytes:
@@ -170,17 +177,32 @@ class KernelCache(FunctionCache):  # type: ignore[misc]  # Numba has no types
 
 
 class _Files:
-    """The files of one kernel; what `numba.core.caching.Cache` asks of its files."""
+    """The files of one kernel; what `numba.core.caching.Cache` asks of its files.
 
-    def __init__(self, folder: Path, name: str, stamp: bytes) -> None:
+    Parameters
+    ----------
+    folder : Path
+        Where they are, and new ones are written.
+    name : str
+        Beginning of their names.
+    stamp : bytes
+        The digest of what they depend on.
+    shared : Path, optional
+        Another folder in which they may be, and which is only read.
+    """
+
+    def __init__(self, folder: Path, name: str, stamp: bytes, shared: Path | None = None) -> None:
         self.folder = folder
         self.name = name
         self.stamp = stamp
+        self.shared = shared
         _known.append(self)
 
     def load(self, key: Any) -> Any:  # noqa: ANN401  Numba has no types
         """Return what was kept under a key, or None."""
-        return _content(self._path(key), (self.stamp, repr(key)))
+        path, expected = self._path(key), (self.stamp, repr(key))
+        found = _content(path, expected)
+        return _content(self.shared / path.name, expected) if found is None and self.shared is not None else found
 
     def save(self, key: Any, data: Any) -> None:  # noqa: ANN401  Numba has no types
         """Keep data under a key: completely or not at all."""
@@ -196,12 +218,17 @@ class _Files:
 
     def flush(self) -> None:
         """Forget what was kept."""
-        for path in self.all():
+        for path in self._all_in(self.folder):
             path.unlink(missing_ok=True)
 
     def all(self) -> Iterator[Path]:
         """Yield the files of this kernel; those of Numba have a number instead of twelve digits."""
-        return self.folder.glob(f"{self.name}.{'?' * 12}{SUFFIX}")
+        yield from self._all_in(self.folder)
+        if self.shared is not None:
+            yield from self._all_in(self.shared)
+
+    def _all_in(self, folder: Path) -> Iterator[Path]:
+        return folder.glob(f"{self.name}.{'?' * 12}{SUFFIX}")
 
     def _remove_leftovers(self) -> None:
         """Remove what a killed process has left while it saved."""

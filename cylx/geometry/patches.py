@@ -184,9 +184,9 @@ def choose_patches(
         Filled with unit normals, either way; zero if there is none.
     """
     frame = np.empty((2, 3))
-    best = np.full(len(which), math.inf)
+    best = np.empty(len(which))
     for s in range(len(which)):
-        owners[s] = -1
+        owners[s], best[s] = -1, math.inf
     for s in range(len(which)):
         for a in range(members.shape[1]):
             i = members[s, a]

@@ -5,10 +5,12 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from cylx.config import describe_fault
+from cylx.errors import InputError
 from cylx.harmless import visible
 
 if TYPE_CHECKING:
@@ -21,11 +23,35 @@ Vector = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Corner = Annotated[list[Number | None], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Annotated[list[Number], Field(min_length=5, max_length=5)]], Field(min_length=5, max_length=5)]
 
+AnyPart = TypeVar("AnyPart", bound="Part")
+
 
 class Part(BaseModel):
     """A part of the result: unknown keys, wrong types and numbers that are not finite are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True)
+
+    @classmethod
+    def parse(cls: type[AnyPart], mapping: Mapping[str, Any], place: str) -> AnyPart:
+        """Parse a JSON object.
+
+        Parameters
+        ----------
+        mapping : mapping
+            The object.
+        place : str
+            Its name in errors, such as the file.
+
+        Raises
+        ------
+        InputError
+            If it is not as this version of the format has it.
+        """
+        try:
+            return cls.model_validate(mapping)
+        except ValidationError as error:
+            path, fault, remedy = describe_fault(error, cls)
+            raise InputError(": ".join(filter(None, [place, ".".join(path)])), fault, remedy) from None
 
 
 class Bounds(Part):

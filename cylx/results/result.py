@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, JsonValue, ValidationError, field_validator, model_validator
+from pydantic import ConfigDict, Field, JsonValue, field_validator, model_validator
 
-from cylx.config import describe_fault
 from cylx.config.choices import Method
 from cylx.errors import InputError
 from cylx.results.cylinders import ResultBlend, ResultCylinder
@@ -158,28 +157,6 @@ class Result(Part):
         moved = None if piping is None else piping.adjustments
         adjusted = None if moved is None else [ResultAdjustment.of(one) for one in moved]
         return {"cylinders": listed, "fittings": fittings, "runs": runs, "adjustments": adjusted}
-
-    @classmethod
-    def parse(cls, mapping: Mapping[str, Any], place: str) -> Result:
-        """Parse a JSON object.
-
-        Parameters
-        ----------
-        mapping : mapping
-            The object.
-        place : str
-            Its name in errors, such as the file.
-
-        Raises
-        ------
-        InputError
-            If it is not a result of this version of the format.
-        """
-        try:
-            return cls.model_validate(mapping)
-        except ValidationError as error:
-            path, fault, remedy = describe_fault(error, cls)
-            raise InputError(": ".join(filter(None, [place, ".".join(path)])), fault, remedy) from None
 
     @classmethod
     def from_json(cls, text: str) -> Result:

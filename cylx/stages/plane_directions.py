@@ -96,7 +96,7 @@ def _fill_faces(
         while n == FACE_CAPACITY and ball > 0.2 * reach:
             ball *= 0.7
             n = gather_ball(points, cells, starts, side, points[seeds[s]], ball, found)
-        stride, k = 1 + n // MOST_ABOUT, 0
+        stride, k = 1 + n // MOST_ABOUT, np.int64(0)  # a bare 0 is a kind of its own
         for a in range(0, n, stride):
             for d in range(3):
                 local[k, d] = points[found[a], d] - points[seeds[s], d]
@@ -135,9 +135,11 @@ def _fill_refined(local: FloatArray, k: int, width: float, tolerance: float, nor
     matrix, vectors, sums = np.empty((3, 3)), np.empty((3, 3)), np.empty(4)
     offset, narrow, beside = 0.0, 0.0, 0
     for _ in range(3):
-        matrix.fill(0.0)
-        sums.fill(0.0)
-        beside = 0
+        beside, sums[3] = 0, 0.0
+        for d in range(3):
+            sums[d] = 0.0
+            for e in range(3):
+                matrix[d, e] = 0.0
         for a in range(k):
             height = local[a, 0] * normal[0] + local[a, 1] * normal[1] + local[a, 2] * normal[2]
             if abs(height - offset) < tolerance:

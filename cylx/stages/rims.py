@@ -78,10 +78,12 @@ def _about(
     points, heights = points[order], heights[order]
     flat = np.ascontiguousarray(points @ basis.T)
     seeds = np.arange(0, len(points), 1 + len(points) // MOST_SEEDS)
+    lows = np.searchsorted(heights, heights[seeds] - HEIGHTS)
+    highs = np.searchsorted(heights, heights[seeds] + HEIGHTS)
     rows = np.zeros((len(seeds), len(REACHES), 6))
 
     def look(part: slice) -> None:
-        _find_circles(flat, heights, seeds[part], noise, *radius_range, rows[part])
+        _find_circles(flat, heights, seeds[part], lows[part], highs[part], noise, *radius_range, rows[part])
 
     step = max(1, -(-len(seeds) // (8 * threads)))
     with ThreadPoolExecutor(threads) as pool:
@@ -103,18 +105,18 @@ def _find_circles(
     flat: FloatArray,
     heights: FloatArray,
     seeds: IndexArray,
+    lows: IndexArray,
+    highs: IndexArray,
     noise: float,
     least: float,
     greatest: float,
     rows: FloatArray,
 ) -> None:
-    """Fill in the best circle through each seed for each reach; of radius zero where there is none."""
+    """Fill in the best circle through each seed, among the points from `lows` to `highs`; of radius zero if none."""
     x, y, z = np.empty(MOST_SEEN), np.empty(MOST_SEEN), np.empty(MOST_SEEN)
     totals = np.zeros(len(REACHES), np.int64)
     for s in range(len(seeds)):
-        i = seeds[s]
-        low = np.searchsorted(heights, heights[i] - HEIGHTS)
-        high = np.searchsorted(heights, heights[i] + HEIGHTS)
+        i, low, high = seeds[s], lows[s], highs[s]
         for level in range(len(REACHES)):
             totals[level] = 0
         for j in range(low, high):

@@ -3,12 +3,14 @@
 The lowest points of small cells are ground, or whatever hides it. Those that stand higher above others than a slope of
 50 degrees are left out. A local plane is then fitted about each cell, by weights that fall off with the height above
 the plane, whose limit is lowered and whose range narrowed from step to step: shrubs and stems lose their say. All is
-local, so that a part of a plot has the ground that it has in the whole.
+local, so that a part of a plot has the ground that it has in the whole. That surface lies under the lowest points; the
+ground is above it, where most points are (`cylx.stems.level`).
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,6 +19,7 @@ from cylx.geometry.arrays import FloatArray, IndexArray, MaskArray
 from cylx.geometry.kernels import njit
 from cylx.optional.extras import is_found
 from cylx.records.stems import Ground
+from cylx.stems.level import levels_over
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,8 +76,8 @@ def find_ground(points: FloatArray, classes: NDArray[Any] | None, by: GroundBy) 
             lowest = np.where(on, z, math.nan), u, v
         else:  # a tree alone: the cloth finds no ground at all
             by = "lowest"
-    heights = _surface(*lowest)
-    return Ground(corner, CELL, heights, by)
+    under = Ground(corner, CELL, _surface(*lowest), by)
+    return replace(under, heights=under.heights + levels_over(points, under))
 
 
 def _lowest(

@@ -24,6 +24,7 @@ COMMANDS = [
     "config",
     "synth",
     "evaluate",
+    "check",
     "diff",
     "deviation",
     "export",
@@ -32,7 +33,7 @@ COMMANDS = [
     "reproduce",
 ]
 LEAVES = [
-    *(["extract"], ["info"], ["evaluate"], ["diff"], ["deviation"], ["export"], ["doctor"], ["warmup"]),
+    *(["extract"], ["info"], ["evaluate"], ["check"], ["diff"], ["deviation"], ["export"], ["doctor"], ["warmup"]),
     *(["config", name] for name in ("init", "show", "check", "schema")),
     *(["synth", name] for name in ("single", "multi")),
 ]

@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 
 import pytest
 
@@ -150,6 +151,29 @@ def test_kept_kernels_are_read_where_nothing_can_be_saved(kernels, tmp_path, mon
     loaded = kernels()
     assert loaded.kernel(1.0) == 2.0
     assert loaded.times_compiled(loaded.kernel) == 0
+    shutil.rmtree(tmp_path / "__pycache__")
+
+
+def test_kernels_of_the_installation_serve_who_may_write_at_home_only(kernels, tmp_path, monkeypatch):
+    """A container whose image was warmed by root, run by a user with a home of its own."""
+    monkeypatch.setattr("numba.core.config.CACHE_DIR", "")
+    kernels().kernel(1.0)
+    monkeypatch.setattr("numba.core.caching.AppDirs.user_cache_dir", str(tmp_path / "home"), raising=False)
+    whole, here = tempfile.TemporaryFile, str(tmp_path / "__pycache__")
+
+    def fail_here(*args, dir=None, **options):  # noqa: A002  as tempfile has it
+        if dir == here:
+            raise PermissionError(13, "Permission denied")
+        return whole(*args, dir=dir, **options)
+
+    monkeypatch.setattr("tempfile.TemporaryFile", fail_here)
+    loaded = kernels()
+    assert loaded.folder_of(loaded.kernel).startswith(str(tmp_path / "home"))
+    assert loaded.kernel(1.0) == 2.0
+    assert loaded.times_compiled(loaded.kernel) == 0
+    assert loaded.kernel(1) == 2.0
+    (file,) = (tmp_path / "home").rglob("*.nbc")
+    assert str(file.parent) == loaded.folder_of(loaded.kernel)
     shutil.rmtree(tmp_path / "__pycache__")
 
 

@@ -40,7 +40,7 @@ def test_every_stem_is_found_with_its_diameter(plot, found):
     for true, one in pairs:
         assert one.dbh == pytest.approx(true.dbh, rel=0.02)
         assert one.lean == pytest.approx(true.lean, abs=np.radians(1.0))
-        assert one.foot[2] == pytest.approx(true.ground, abs=0.1)
+        assert one.foot[2] == pytest.approx(true.ground, abs=0.04)
         assert 0 < one.dbh_sd < 0.03 * one.dbh
         assert one.arc == pytest.approx(true.arc, abs=np.radians(25.0))
         assert one.lowest < 0.6
@@ -90,7 +90,7 @@ def test_the_ground_is_found_in_other_ways(plot, found, by):
     other = find_stems(cloud, ground=None if by == "classes" else by)
     assert other.ground.by == by
     for true, one in pairs_of(plot, other.stems):
-        assert one.foot[2] == pytest.approx(true.ground, abs=0.1)
+        assert one.foot[2] == pytest.approx(true.ground, abs=0.04)
     assert len(other.stems) == len(found.stems)
 
 
