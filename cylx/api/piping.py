@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,7 @@ def extraction_of(result: Result, cloud: PointCloud) -> Extraction:
     return Extraction(fits, labels, residuals, cloud, scene, (), config, warnings, blends=blends)
 
 
-def _are_theirs(ids: NDArray[np.generic], fits: Sequence[CylinderFit], points: NDArray[np.float64]) -> bool:
+def _are_theirs(ids: NDArray[np.integer[Any]], fits: Sequence[CylinderFit], points: NDArray[np.float64]) -> bool:
     """Return whether most points lie about the cylinder they are said to be of; otherwise another result said it."""
     there = np.flatnonzero(ids >= 0)
     there = there[:: max(1, len(there) // MOST_ASKED)]

@@ -25,6 +25,8 @@ UNEVEN, MOST_UNEVEN = 0.02, 0.1
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
 MOST_ARC = math.radians(270.0)
 """Angle of the surface from which a refused segment is no arc between two planes."""
+SAME_EDGE = math.cos(math.radians(25.0))
+"""The middles of two arcs of one edge enclose a smaller angle, seen from the axis."""
 FLAT_SIDES = 0.3
 """Share of a flank from which what was found may be two rounded edges of a bar or a plate."""
 MOST_LOOSENED, LEAST_KEPT = 1.05, 0.85
@@ -123,11 +125,12 @@ class Judge:
             return RejectedSegment(segment, reason, support, payoff, confidence, verdict.coverage, verdict.measures)
         return _finding(segment, verdict, support, payoff)
 
-    def arc_between_planes(self, rejected: RejectedSegment) -> Finding | None:
-        """Verify an arc with the planes that it goes on into, where no cylinder could be fitted; None if it is none."""
+    def arcs_between_planes(self, rejected: RejectedSegment) -> list[Finding | RejectedSegment]:
+        """Verify arcs, with the planes they go on into, where no cylinder could be fitted; else give that back."""
         if not (self._limits.enabled and self._limits.blends):
-            return None
-        return self._judge_arc(rejected.segment, rejected.support, rejected.payoff, goes_on=False)
+            return [rejected]
+        arc = self._judge_arc(rejected.segment, rejected.support, rejected.payoff, goes_on=False)
+        return [rejected] if arc is None else self._judge_edges(arc) or [arc]
 
     def join(self, segment: Segment, best: Finding) -> Finding | None:
         """Refit and judge a joined segment in the light of the better of its parts; None if it is no cylinder."""
@@ -137,7 +140,8 @@ class Judge:
     def join_blend(self, segment: Segment, best: Finding) -> Finding | None:
         """Refit and judge a joined blend in the light of the better of its parts; None if it is none."""
         if best.segment.wedge is not None:  # it was fitted with the planes that touch it, and so is the whole
-            return self._judge_arc(segment, best.support, best.payoff, goes_on=False)
+            whole = self._judge_arc(segment, best.support, best.payoff, goes_on=False)
+            return whole if whole is not None and _is_same_edge(whole.segment, best.segment) else None
         found = self._judge_joined(segment, best)
         return found if found is not None and found.blend else None
 
@@ -207,6 +211,13 @@ class Judge:
 
     def _refit(self, segment: Segment) -> Segment | str:
         return refit(segment, self._indexed, most=ENOUGH_TO_JUDGE)
+
+
+def _is_same_edge(whole: Segment, part: Segment) -> bool:
+    """Return whether an arc lies between the same planes as a part of it: both edges of a bar are no one half round."""
+    if whole.wedge is None or part.wedge is None:
+        return True
+    return float(whole.wedge[:3] @ part.wedge[:3]) > SAME_EDGE
 
 
 def _may_have_pieces(one: Finding | RejectedSegment) -> bool:

@@ -182,11 +182,10 @@ class Rounds:
             log.advance()
 
     def _outcomes_of(self, one: Fitted | RejectedSegment) -> list[Finding | RejectedSegment]:
-        """Judge a segment: it, or the pieces of it that are cylinders, or the arc where no cylinder could be fitted."""
+        """Judge a segment: it, or the pieces of it that are cylinders, or arcs where no cylinder could be fitted."""
         if isinstance(one, Fitted):
             return self._judge.in_pieces(one.segment, one.support, one.payoff)
-        arc = None if one.reason == FOUND_BEFORE else self._judge.arc_between_planes(one)
-        return [one if arc is None else arc]
+        return [one] if one.reason == FOUND_BEFORE else self._judge.arcs_between_planes(one)
 
     def _restore_beyond(self, fitted: list[Fitted]) -> None:
         """Put the members of clusters back into the game that were laid beyond the ends of what these led to."""

@@ -35,8 +35,8 @@ def split_jogs(pipes: list[Pipe], near: Surroundings) -> list[Pipe]:
     k = 0
     while k < len(out):
         sides = None if out[k].is_other else _sides_of_hole(out[k], near)
-        off = sides is not None and any(
-            _bends_off(side, end, out, k, near) for side, end in zip(sides, ("end", "start"), strict=True)
+        off = sides is not None and (
+            _bends_off(sides[0], "end", out, k, near) or _bends_off(sides[1], "start", out, k, near)
         )
         if sides is not None and off:
             other = replace(sides[1], label=near.new_label(), source=None)

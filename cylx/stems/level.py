@@ -64,7 +64,7 @@ def levels_over(points: FloatArray, ground: Ground) -> FloatArray:
             enough = _smooth(total[..., 0], wide) * 2.0 * math.pi * wide**2 >= ENOUGH
             found = _peaks(_smooth(weighted, wide))
             out = np.where(missing & enough, found, out)
-    return np.nan_to_num(out)
+    return np.asarray(np.nan_to_num(out), np.float64)
 
 
 def _counts(points: FloatArray, ground: Ground) -> FloatArray:
