@@ -25,6 +25,8 @@ UNEVEN, MOST_UNEVEN = 0.02, 0.1
 and deviation, in radii, up to which a piece of what is no cylinder as a whole may be one."""
 MOST_ARC = math.radians(270.0)
 """Angle of the surface from which a refused segment is no arc between two planes."""
+MUCH_LIKELIER = 0.2
+"""What passes as a cylinder is none but an arc unless it is likelier by this much."""
 SAME_EDGE = math.cos(math.radians(25.0))
 """The middles of two arcs of one edge enclose a smaller angle, seen from the axis."""
 FLAT_SIDES = 0.3
@@ -114,7 +116,7 @@ class Judge:
             goes_on = may_be_arc(verdict, surely=not reason)
             if goes_on or (reason and verdict.coverage < MOST_ARC):
                 arc = self._judge_arc(segment, support, payoff, goes_on=goes_on)
-                if arc is not None:
+                if arc is not None and (reason or arc.confidence > verdict.confidence - MUCH_LIKELIER):
                     return arc
         if limits.enabled and verdict.measures and not segment.upright:
             standing = self._judge_upright(segment, support, payoff)
